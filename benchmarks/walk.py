@@ -120,7 +120,7 @@ class _Seed:
             )
             create(folder, plan, {member.name: "values: {}\n"})
         found = open_run(folder)
-        total = found.plan.config.learning.iterations(stage)
+        total = found.plan.config.iterations(stage)
         if found.done() < total:
             print(f"training {folder}", flush=True)
             launch.train_slice(found, ["cpu"], total, float("inf"), _quiet, None, NATIVE, cores())

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pydantic
 
-from draft.design.findings import ERRORS, KINDS
+from draft.design.checks import ERRORS, KINDS
 from draft.laws.quantities import QUANTITIES
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
@@ -83,7 +83,7 @@ Findings of the design filter. An error refuses the design unless `allow` lists 
 # Words of what links end in.
 ENDS: list[type[Model]] = [
     typing.cast(type[Model], link.model_fields[link.end.key].annotation)
-    for link in LINKS
+    for link in LINKS.values()
     if link.end is not None
 ]
 SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
@@ -94,10 +94,10 @@ SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
     (
         "tree.yaml",
         (
-            schema.TreeFile,
+            schema.tree_file(),
             root.Trunk,
             LinkBase,
-            *LINKS,
+            *LINKS.values(),
             schema.ChainUse,
             schema.JointChange,
             basic.Joint,
@@ -163,6 +163,8 @@ _NAMES: dict[object, str] = {str: "text", float: "number", int: "integer", bool:
 def _words(annotation: object) -> str:
     if annotation in _NAMES:
         return _NAMES[annotation]
+    if annotation == schema.Node:
+        return " or ".join(map(_title, (schema.ChainUse, *LINKS.values())))
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is typing.Annotated:
         return _words(arguments[0])

@@ -1,4 +1,4 @@
-"""Pages of the site that follow from the code: commands, metrics, laws, API and examples.
+"""Pages of the site that follow from the code: commands, tables of names, laws, API and examples.
 
 `write_all` writes them to docs/generated, which git ignores, whenever the site is built, so that
 they cannot differ from the code.
@@ -20,6 +20,7 @@ from pathlib import Path
 import draft
 from draft.cli import COMMANDS, functions, main
 from draft.metrics import LEARNED, METRICS
+from draft.metrics.capabilities import CAPABILITIES
 
 DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "generated"
@@ -72,7 +73,7 @@ def metrics() -> str:
         "are computed from its joint-space inertia; those that need a policy are measured by "
         "roll-outs (`draft metrics DESIGN --learned`, `draft.metrics.of_policy`).\n"
     ]
-    for metric in (METRICS | LEARNED).values():
+    for metric in (*METRICS.values(), *LEARNED.values()):
         unit = {"1": "none", "bool": "yes or no"}.get(metric.unit, metric.unit)
         needs = _NEEDS[metric.needs]
         better = f"- better: {_BETTER[metric.better]}\n" if metric.better else ""
@@ -103,6 +104,21 @@ def laws() -> str:
         parts += [_law(law, found) for law, found in record["segments"].items()]
         whole = ("trunk", "calibrated", "other", "whole", "end")
         parts += [_law(law, record[law]) for law in whole if law in record]
+    return "".join(parts)
+
+
+def capabilities() -> str:
+    """Return the reference of what a policy is measured by, from the table of capabilities."""
+    head = "\n| name | quantity | unit | better | definition |\n|---|---|---|---|---|\n"
+    parts = [
+        "# Capabilities\n\nWhat a robot can do with a policy, from roll-outs of the standard tests "
+        "([What can a policy do?](../learning.md#what-can-a-policy-do)). Reports, studies, "
+        "`summary.json` and `draft.evaluate` use these names.\n",
+        head,
+    ]
+    for name, one in CAPABILITIES.items():
+        unit = "" if one.unit == "1" else one.unit
+        parts.append(f"| `{name}` | {one.label} | {unit} | {one.better} | {one.text} |\n")
     return "".join(parts)
 
 
@@ -181,6 +197,7 @@ def example_index() -> str:
 PAGES: dict[str, Callable[[], str]] = {
     "commands": commands,
     "metrics": metrics,
+    "capabilities": capabilities,
     "laws": laws,
     "api": api,
     "examples/index": example_index,

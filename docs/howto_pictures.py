@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import importlib
+import re
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -21,6 +24,7 @@ prefer_offscreen()  # before MuJoCo is imported
 from docs import blocks, howto_figures  # noqa: E402
 from docs.pictures import IMAGES, row, shrink  # noqa: E402
 from draft.design.references import open_design  # noqa: E402
+from draft.spec import Spec, load  # noqa: E402
 
 OUT = IMAGES / "howto"
 SIZE = (900, 560)
@@ -85,6 +89,18 @@ def _ros(folder: Path, path: Path) -> None:
     howto_figures.exported(folder / "bear_ros", path)
 
 
+def _padded(folder: Path, path: Path) -> None:
+    """Draw the hopper on its ball, and on the pad of the example of an extension."""
+    sys.path.insert(0, str(folder / "examples" / "extension"))
+    importlib.import_module("draft_example.pad")
+    hopper = load("hopper")
+    files = {name: file.read_bytes().decode() for name, file in hopper.files.items()}
+    tree = files["tree.yaml"].replace("type: sphere", "type: pad")
+    pad = "pad: {radius: 0.05, thickness: 0.02, site: foot}"
+    files["tree.yaml"] = re.sub(r"sphere: \{.*\}", pad, tree)
+    row([one.resolve().build() for one in (hopper, Spec.parse(files))], path, SIZE)
+
+
 PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "quadruped": _robots("courier:courier/search/designs/front_001.yaml"),
     "arm": _robots("arm_dog"),
@@ -97,6 +113,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "train": _walk,
     "walk": _studio,
     "ros": _ros,
+    "extend": _padded,
 }
 
 if __name__ == "__main__":

@@ -23,12 +23,12 @@ from draft.offscreen import prefer_offscreen
 prefer_offscreen()  # before MuJoCo is imported
 
 from draft.errors import DraftError  # noqa: E402
-from draft.fitting.structure.survey_rows import read  # noqa: E402
 from draft.imports import drives, names  # noqa: E402
 from draft.imports.expected import expected_mass  # noqa: E402
 from draft.imports.importer import POPULATIONS, spec_of, translate  # noqa: E402
 from draft.imports.sources import find_source  # noqa: E402
 from draft.laws.structure import CALIBRATED, PAPER  # noqa: E402
+from draft.laws.survey import read  # noqa: E402
 from draft.twins import every  # noqa: E402
 from draft.twins.compare import Comparison, compare_twin  # noqa: E402
 from draft.values import scalar  # noqa: E402

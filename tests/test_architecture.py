@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -52,7 +53,7 @@ BELOW: dict[str, set[str]] = {
     # robots
     "description": set(),
     "fitting": {"laws", "description"},
-    "imports": {"laws", "spec", "design", "model", "description", "fitting"},
+    "imports": {"laws", "spec", "design", "model", "description"},
     "twins": {"laws", "spec", "design", "model", "description", "fitting", "imports"},
     "serving": set(),
     # what designs can do
@@ -71,6 +72,8 @@ BELOW: dict[str, set[str]] = {
         *("metrics", "explore", "reporting", "studio", "learn", "study", "serving"),
         "doctor",
     },
+    # The face for extensions: names by their modules, like those of the package itself.
+    "extend": {"errors"},
     # `import draft` alone brings the errors; the nouns come on first use, by their names.
     "__init__": set(),
     "__main__": {"cli"},
@@ -203,6 +206,43 @@ def test_what_starts_the_command_line_by_its_name_is_found() -> None:
     ):
         assert _starts_of_the_command_line(text) == [1]
     assert _starts_of_the_command_line('run([sys.executable, "-m", "draft.learn.x"])') == []
+
+
+OPTION = re.compile(r"(?<![\w-])--[a-z]+(?:-[a-z]+)*(?![\w-])")
+
+
+def _options(text: str) -> list[int]:
+    """Lines that spell an option in a string; a word of a list is an argument of a process."""
+    tree = ast.parse(text)
+    words = {id(one) for node in ast.walk(tree) if isinstance(node, ast.List) for one in node.elts}
+    return [
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if OPTION.search(node.value) and id(node) not in words
+    ]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in FILES if path.relative_to(SOURCE).parts[0] != "cli"],
+    ids=lambda path: path.relative_to(SOURCE).as_posix(),
+)
+def test_only_the_command_line_spells_options(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert _options(text) == []
+    assert "--{" not in text, "an option whose name is filled in"
+
+
+def test_what_spells_an_option_is_found() -> None:
+    for text in (
+        'raise DraftError(cause, "omit --out")',
+        'f"--knee-drive {place}"',
+        '"""As `--json` prints it."""',
+    ):
+        assert _options(text) == [1]
+    for text in ('run(["uv", "sync", "--no-dev"])', '"--"', '"`Spec --resolve--> Design`"'):
+        assert _options(text) == []
 
 
 def test_the_ground_stands_on_nothing_but_itself() -> None:

@@ -97,7 +97,7 @@ def test_a_gpu_is_assumed_from_its_driver_unless_pytorch_is_asked(
     monkeypatch.setattr(machine, "devices", lambda name: asked.append(name) or ["cpu"])
     told = rows()["learning"]
     assert told.startswith("MuJoCo Warp")
-    assert told.endswith("--torch asks PyTorch")
+    assert told.endswith("`torch` asks PyTorch")
     assert asked == []
     assert "asks PyTorch" not in rows(ask=True)["learning"]
     assert asked == ["auto"]

@@ -32,7 +32,7 @@ WITHOUT = {name for name in draft.__all__ if name.endswith("Error")} | {"Locatio
 
 # Public functions and classes, and the functions of `draft.metrics`.
 DOCUMENTED = [
-    *sorted({*draft.__all__} - WITHOUT - {"metrics", "study"}),
+    *sorted({*draft.__all__} - WITHOUT - {"extend", "metrics", "study"}),
     *("metrics.find", "metrics.of_design", "metrics.of_model"),
 ]
 
@@ -52,7 +52,7 @@ def test_every_lazy_name_is_the_one_that_type_checkers_see() -> None:
         for module, names in re.findall(r"^    from (draft[\w.]*) import (.+)$", text, re.M)
         for name in names.split(",")
     }
-    assert seen == {**draft._MODULES, "metrics": "draft", "study": "draft"}
+    assert seen == {**draft._MODULES, "extend": "draft", "metrics": "draft", "study": "draft"}
 
 
 def test_names_and_signatures(file_regression: FileRegressionFixture) -> None:

@@ -17,6 +17,7 @@ import yaml
 from docs import blocks, generated_pages
 from draft.cli import COMMANDS, functions
 from draft.metrics import METRICS
+from draft.metrics.capabilities import CAPABILITIES
 from tests.environments import warm
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -30,6 +31,7 @@ NEEDS = {
     "howto/arm": (),
     "howto/biped": (),
     "howto/explore": ("explore", "figures", "report"),
+    "howto/extend": (),
     "howto/hexapod": (),
     "howto/import": ("report",),
     "howto/motors": (),
@@ -87,7 +89,7 @@ def test_every_page_of_tasks_is_tested_and_has_its_picture() -> None:
         assert 2_000 < picture.stat().st_size < 150_000
 
 
-def test_commands_and_metrics_are_all_on_their_pages() -> None:
+def test_commands_metrics_and_capabilities_are_all_on_their_pages() -> None:
     commands = generated_pages.commands()
     for command in COMMANDS:
         assert f"\n## draft {command}\n" in commands
@@ -98,6 +100,9 @@ def test_commands_and_metrics_are_all_on_their_pages() -> None:
     for metric in METRICS.values():
         assert f"\n## {metric.name}\n\n{metric.doc}\n" in metrics
         assert f"- formula: `{metric.formula}`" in metrics
+    capabilities = generated_pages.capabilities()
+    for name, one in CAPABILITIES.items():
+        assert f"| `{name}` | {one.label} |" in capabilities
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ from draft.errors import (
 )
 
 if TYPE_CHECKING:
-    from draft import metrics, study
+    from draft import extend, metrics, study
     from draft.design import Design, Finding
     from draft.explore.runs import optimise, screen, sweep
     from draft.imports.importer import import_robot
@@ -55,6 +55,7 @@ __all__ = [
     "compare_twin",
     "evaluate",
     "export",
+    "extend",
     "import_robot",
     "load",
     "metrics",
@@ -100,7 +101,7 @@ def __getattr__(name: str) -> object:
     """Import a public name on first use, so that `import draft` is fast."""
     import importlib
 
-    if name in ("metrics", "study"):  # packages: importing one sets the attribute
+    if name in ("extend", "metrics", "study"):  # modules: importing one sets the attribute
         return importlib.import_module(f"draft.{name}")
     if name not in _MODULES:
         raise AttributeError(f"module 'draft' has no attribute '{name}'")

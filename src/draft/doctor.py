@@ -1,4 +1,4 @@
-"""Description of an installation: versions, extras, GPU, renderers, browser and learning engine.
+"""Description of an installation: versions, extras, extensions, GPU, drawing, browser, learning.
 
 Nothing large is imported: versions come from the metadata of packages, and each renderer is tried
 in a process of its own, since MuJoCo loads only one of them and a broken driver may crash.
@@ -17,12 +17,12 @@ import subprocess
 import sys
 import webbrowser
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from draft import extras, offscreen
+from draft import extensions, extras, offscreen
 from draft.errors import DraftError
 from draft.learn.engine.machine import Machine, free_memory, gpu_possible, this_machine
 
@@ -57,7 +57,7 @@ class Row:
     Attributes:
         item: what it describes.
         text: what was found.
-        record: the same as plain data, for `--json`.
+        record: the same as plain data, for JSON.
     """
 
     item: str
@@ -77,6 +77,7 @@ def examine(ask: bool = False) -> list[Row]:
         Row("system", platform.platform(), None),
         _libraries(),
         *_extras(),
+        *_extensions(),
         _gpu(),
         _rendering(),
         _browser(),
@@ -111,6 +112,16 @@ def _extras() -> Iterator[Row]:
             text = f"missing {', '.join(missing)}: {command}"
         record = {"installed": present, "missing": missing, "install": command}
         yield Row(f"extra {extra}", text, record)
+
+
+def _extensions() -> Iterator[Row]:
+    """What installed extensions have added, or why they are not used."""
+    for one in extensions.load():
+        added = extensions.added(one)
+        words = [f"{kind} {', '.join(names)}" for kind, names in added.items()]
+        text = f"not used: {one.problem}" if one.problem else "; ".join(words) or "adds nothing"
+        record = asdict(one) | {"added": added}
+        yield Row(f"extension {one.name}", f"{one.package} {one.version}, {text}", record)
 
 
 # --- drawing -----------------------------------------------------------------------------------
@@ -234,11 +245,10 @@ def _nvidia() -> list[str]:
     program = shutil.which("nvidia-smi")
     if program is None:
         return []
-    query = "--query-gpu=name,memory.total,driver_version"
     done = None
     with contextlib.suppress(OSError, subprocess.TimeoutExpired):
         done = subprocess.run(
-            [program, query, "--format=csv,noheader"],
+            [program, "--query-gpu=name,memory.total,driver_version", "--format=csv,noheader"],
             capture_output=True,
             text=True,
             timeout=_PATIENCE,
@@ -263,7 +273,7 @@ def _learning(ask: bool) -> Iterator[Row]:
     yield Row("cores", text, {"physical": here.cores, "logical": logical, "free_bytes": free})
     text = plan.engine_line()
     if not here.on_cpu and not ask:
-        text += "; assumed from the driver, --torch asks PyTorch"
+        text += "; assumed from the driver, `torch` asks PyTorch"
     yield Row("learning", text, plan.record() | {"asked": ask})
     for stage in plan.stage_lines():
         yield Row("", f"recipe {plan.recipe}: {stage}", None)

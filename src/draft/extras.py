@@ -46,9 +46,9 @@ def remedy(extra: str) -> str:
     folder = checkout()
     if folder is not None:
         inside = Path.cwd().resolve().is_relative_to(folder)
-        project = "" if inside else f"--project {shlex.quote(str(folder))} "
-        tools = "" if importlib.util.find_spec(_TOOL) else "--no-dev "
-        return f"uv sync {project}{tools}--inexact --extra {extra}"
+        project = [] if inside else ["--project", str(folder)]
+        tools = [] if importlib.util.find_spec(_TOOL) else ["--no-dev"]
+        return shlex.join(["uv", "sync", *project, *tools, "--inexact", "--extra", extra])
     pip = "pip" if importlib.util.find_spec("pip") else "uv pip"
     return f"{pip} install '{DISTRIBUTION}[{extra}]'"
 

@@ -108,7 +108,7 @@ def new_file(
 
 @contextmanager
 def new_folder(
-    target: Path, remedy: str = "choose another --out", replace: bool = True
+    target: Path, remedy: str = "choose another `out`", replace: bool = True
 ) -> Iterator[Path]:
     """Write a folder atomically.
 
@@ -238,7 +238,7 @@ def held(folder: Path, command: str) -> Iterator[None]:
             folder.mkdir(parents=True, exist_ok=True)
             file = lock(folder, command)
         except OSError as error:
-            raise cannot_write(folder, error, "choose another --out") from None
+            raise cannot_write(folder, error, "choose another `out`") from None
         with file:
             yield
     except BaseException:
@@ -269,7 +269,7 @@ def lock(folder: Path, command: str) -> IO[str]:
         file.seek(0)
         cause = f"another '{command}' is running in '{folder}' (process {file.read() or '?'})"
         file.close()
-        raise DraftError(cause, "wait for it, or choose another --out") from None
+        raise DraftError(cause, "wait for it, or choose another `out`") from None
     file.truncate(0)
     file.write(str(os.getpid()))
     file.flush()

@@ -66,7 +66,7 @@ def run(
             deaths += 1
             if deaths == _MAX_DEATHS:
                 cause = f"a worker process died {_MAX_DEATHS} times in a row"
-                remedy = "the memory may be too small: use fewer --workers"
+                remedy = "the memory may be too small: use fewer `workers`"
                 raise DraftError(cause, remedy) from None
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMN = 89 / 25.4
-_REMEDY = "give another --out DIR"
+_REMEDY = "give another `out=DIR`"
 DPI = 400
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
 # Colours of designs side by side, in their order.

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,3 +143,19 @@ def some(mask: Mask) -> bool:
 def every(mask: Mask) -> bool:
     """Whether a mask is true for all designs."""
     return bool(mask.all()) if isinstance(mask, np.ndarray) else bool(mask)
+
+
+def plain(record: Mapping[str, object]) -> dict[str, Any]:
+    """Convert a record to plain data for JSON and YAML: dicts, lists, strings and numbers."""
+    return {str(key): plain_value(item) for key, item in record.items()}
+
+
+def plain_value(value: object) -> object:
+    """Convert a value of a record to plain data."""
+    if isinstance(value, dict):
+        return plain(value)
+    if isinstance(value, (list, tuple)):
+        return [plain_value(item) for item in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    return value

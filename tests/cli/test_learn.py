@@ -27,7 +27,7 @@ LAPTOP = Recipe(
         "learning.iterations_push": Change(250, "3.1 million steps"),
         "learning.mirror": Change(True, "each sample teaches both sides"),
     },
-    uneven=("terrain",),
+    plane=True,
 )
 LAPTOP_LINES = """\
 engine: native MuJoCo (the fastest without a GPU), 2 cores, 2 processes

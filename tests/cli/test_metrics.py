@@ -15,7 +15,7 @@ def test_without_a_robot_every_metric_is_listed(capsys: pytest.CaptureFixture[st
     assert main(["metrics"]) == 0
     out, err = capsys.readouterr()
     assert err == ""
-    for metric in (METRICS | LEARNED).values():
+    for metric in (*METRICS.values(), *LEARNED.values()):
         for words in (metric.name, metric.doc, metric.formula, metric.source):
             assert words in out
 

@@ -25,11 +25,11 @@ from draft.design.report import report
 from draft.fitting.structure import fits
 from draft.fitting.structure import survey_holdout as holdout
 from draft.fitting.structure.attribution import Machine, machines
-from draft.fitting.structure.survey_rows import FILE as SEGMENTS
-from draft.fitting.structure.survey_rows import read
 from draft.laws.actuators import SETS, laws
 from draft.laws.catalogue import catalogue
 from draft.laws.law import quantile, sigma_of_fold
+from draft.laws.survey import FILE as SEGMENTS
+from draft.laws.survey import read
 
 GEARED = [part for part in catalogue().values() if part.gear_ratio is not None]
 QUADRUPED = draft.load("quadruped")

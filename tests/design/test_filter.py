@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
+from draft.design.checks import ERRORS, KINDS
 from draft.design.filter_actuators import highest
-from draft.design.findings import ERRORS, KINDS, Finding, grouped, note
+from draft.design.findings import Finding, grouped, note
 from draft.laws.actuators import laws
 from draft.laws.catalogue import aspect_range, catalogue
 from draft.laws.structure import population

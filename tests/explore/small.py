@@ -97,4 +97,4 @@ def metric(monkeypatch: pytest.MonkeyPatch, name: str = "weight", needs: Any = "
         return 10.0 * design.mass
 
     one = Metric(name, "N", "Weight.", "10 m", "a test", "less", needs, weight)
-    monkeypatch.setitem(METRICS, name, one)
+    monkeypatch.setitem(METRICS._items, name, one)

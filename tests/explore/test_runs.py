@@ -116,7 +116,7 @@ def test_what_is_neither_a_range_nor_a_list_is_an_error(given: Any) -> None:
     ("changes", "message"),
     [
         ({"out": "."}, "'.' is a folder"),
-        ({"workers": 0}, "--workers 0 is not from 1 to 1024"),
+        ({"workers": 0}, "`workers` 0 is not from 1 to 1024"),
         ({"vary": {}}, "nothing is varied"),
         ({"vary": {"thigh": (0.2, 0.3)}}, "'thigh' is not a parameter"),
         ({"robot": "quadrupd"}, "did you mean 'quadruped'?"),

@@ -19,7 +19,8 @@ from hypothesis import strategies as st
 
 import draft
 from draft.cli import main
-from draft.design.findings import KINDS, note
+from draft.design.checks import KINDS
+from draft.design.findings import note
 from draft.explore.engines import LocalEngine
 from draft.explore.job import opened
 from draft.explore.parquet_parts import Parts, about

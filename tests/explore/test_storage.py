@@ -50,7 +50,7 @@ def test_a_database_of_optuna_itself_is_kept_and_can_be_continued(tmp_path: Path
     path = tmp_path / FILE
     open_storage({"seed": 0}, ["minimize"], tmp_path, f"sqlite:///{path}")
     before = path.read_bytes()
-    with pytest.raises(DraftError, match=r"(?s)is a database of Optuna.*add --storage sqlite:///"):
+    with pytest.raises(DraftError, match=r"(?s)is a database of Optuna.*add `storage` sqlite:///"):
         open_storage({"seed": 0}, ["minimize"], tmp_path, None)
     assert path.read_bytes() == before
     _, manifest = open_storage({"seed": 1}, ["minimize"], tmp_path, f"sqlite:///{path}")

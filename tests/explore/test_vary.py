@@ -77,8 +77,8 @@ def test_listed_values_all_come_as_often() -> None:
     ("words", "message"),
     [
         ((), "nothing is varied"),
-        (("thigh_length",), "--vary 'thigh_length' gives no range"),
-        (("thigh_length=",), "--vary 'thigh_length=' gives no range"),
+        (("thigh_length",), "`vary` 'thigh_length' gives no range"),
+        (("thigh_length=",), "`vary` 'thigh_length=' gives no range"),
         (("thigh_lenght=0.2:0.7",), "did you mean 'thigh_length'?"),
         (("leg.peak_torque=40:50",), "write 'actuators.leg.peak_torque'"),
         (("actuators.lg.peak_torque=40:50",), "did you mean 'leg'?"),
@@ -102,8 +102,8 @@ def test_listed_values_all_come_as_often() -> None:
         (("crouch=0:1:log",), "a logarithmic range cannot start at 0"),
         (("actuators.leg.peak_torque=0:5",), "it must be above zero"),
         (("actuators.leg.friction_loss=-1:5",), "it must be zero or more"),
-        (("crouch=0:1", "crouch=0:2"), "--vary gives 'crouch' twice"),
-        (("trunk_width=0.2:0.3",), "'trunk_width' is given by --set and by --vary"),
+        (("crouch=0:1", "crouch=0:2"), "`vary` gives 'crouch' twice"),
+        (("trunk_width=0.2:0.3",), "'trunk_width' is given by `values` and by `vary`"),
     ],
 )
 def test_what_cannot_be_varied_is_said(words: tuple[str, ...], message: str) -> None:
@@ -115,16 +115,16 @@ def test_what_cannot_be_varied_is_said(words: tuple[str, ...], message: str) -> 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (" ", "--where is empty"),
-        ("leg.mass <", "--where:1:11: 'leg.mass <' is not an expression: invalid syntax"),
-        ("accepted and masss < 4", "--where:1:14: unknown name 'masss'"),
+        (" ", "`where` is empty"),
+        ("leg.mass <", "`where`:1:11: 'leg.mass <' is not an expression: invalid syntax"),
+        ("accepted and masss < 4", "`where`:1:14: unknown name 'masss'"),
         ("acepted", "did you mean 'accepted'?"),
         ("thigh_lenght > 1", "did you mean 'thigh_length'?"),
         ("leg < 1", "'leg' is an actuator class, not a number"),
-        ("lg.mass < 1", "--where:1:1: unknown actuator class 'lg'\n  did you mean 'leg'?"),
-        ("1 < leg.mas", "--where:1:5: an actuator has no 'mas' to read\n  did you mean 'mass'?"),
+        ("lg.mass < 1", "`where`:1:1: unknown actuator class 'lg'\n  did you mean 'leg'?"),
+        ("1 < leg.mas", "`where`:1:5: an actuator has no 'mas' to read\n  did you mean 'mass'?"),
         ("print(1)", "unknown function 'print'"),
-        ("accepted; 1", "--where:1:9: 'accepted; 1' is not an expression"),
+        ("accepted; 1", "`where`:1:9: 'accepted; 1' is not an expression"),
         ("[1]", "'[1]' is not allowed in an expression"),
     ],
 )

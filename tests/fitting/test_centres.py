@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from draft.description.segments import segments
 from draft.fitting.structure import centres, feet, fits
 from draft.fitting.structure import survey_refit as refit
-from draft.fitting.structure import survey_rows as rows
 from draft.fitting.structure.attribution import Machine, Piece, machine, machines
 from draft.fitting.structure.parse import parse
 from draft.fitting.structure.robots import robots
+from draft.laws import survey as rows
 from draft.laws.structure import population
 
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))

@@ -17,7 +17,6 @@ from draft.fitting.structure import (
     attribution,
     calibrated,
     fits,
-    roles,
     whole,
 )
 from draft.fitting.structure import (
@@ -26,16 +25,16 @@ from draft.fitting.structure import (
 from draft.fitting.structure import (
     survey_refit as refit,
 )
-from draft.fitting.structure import (
-    survey_rows as rows,
-)
-from draft.fitting.structure.attribution import Machine, machines, price, usable
+from draft.fitting.structure.attribution import Machine, machines, price
 from draft.fitting.structure.parse import parse
 from draft.fitting.structure.robots import hosts, robots
 from draft.fitting.structure.survey_published import figures
+from draft.laws import joint_roles as roles
 from draft.laws import structure
+from draft.laws import survey as rows
 from draft.laws.actuators import laws
 from draft.laws.structure import FILE
+from draft.laws.survey import usable
 
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
 MANIFEST = SHARED / "robots" / "manifest.csv"

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import draft
-from draft.model.folder import plain
+from draft.values import plain
 
 RECORDS = Path(__file__).parent / "records"
 OURS, MUJOCOS = 1e-9, 1e-6

@@ -194,7 +194,7 @@ def test_a_biped_that_faces_along_y_is_turned() -> None:
 def test_a_stated_population_holds_and_is_said() -> None:
     limbs = found(robot(*legs(*FOUR)), "humanoid")
     assert limbs.population == "humanoid"
-    assert limbs.reason == ("stated by --population; by its structure: four limbs reach the ground")
+    assert limbs.reason == ("stated by `population`; by its structure: four limbs reach the ground")
 
 
 @pytest.mark.parametrize("name", ["torso.urdf", "unitree_g1.urdf", "ankle_arm.urdf", "spot.urdf"])

@@ -150,7 +150,7 @@ def test_a_drive_at_its_dead_centre_is_lost_with_a_word(tmp_path: Path) -> None:
     files = translated(tmp_path, four_bar(crank=0.0))
     words = notes(files, "closed loop 'FL_rod_end'")
     assert "the drive of 'FL_crank_joint' is left out" in words[0]
-    assert "--torque FL_knee=VALUE" in words[0]
+    assert "`torque` FL_knee=VALUE" in words[0]
 
 
 def test_bodies_beyond_a_held_joint_are_no_part_of_a_straight_rod(tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ def test_each_member_of_a_slim_link_with_a_bend_weighs_by_its_own_length() -> No
     lengths = {"thigh_length": 0.1, "thigh_length_2": 0.3}
     parameters = SimpleNamespace(value=lengths.__getitem__, add=lambda name, *_: name)
     volumes = SimpleNamespace(structure=lambda _: 0.02)
-    writer = SimpleNamespace(volumes=volumes, parameters=parameters, people="quadruped")
+    writer = SimpleNamespace(volumes=volumes, parameters=parameters, population="quadruped")
     nodes: list[dict[str, Any]] = [
         {"link": {"length": name, "segment": "thigh"}} for name in lengths
     ]

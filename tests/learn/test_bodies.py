@@ -75,14 +75,14 @@ def test_the_same_seed_draws_the_same_bodies_and_more_only_add_to_them() -> None
         (["hopper"], (), None, {}, "hopper cannot be trained"),
         (["hopper"], ("thigh_length=0.2:0.3",), 2, {}, "hopper cannot be trained"),
         (["cheetah", "hopper"], (), None, {}, "design 2 of the family, hopper:default"),
-        (["cheetah"], (), 8, {}, "--bodies draws designs, but nothing is varied"),
-        (["cheetah"], VARY, None, {}, "--bodies is missing"),
-        (["cheetah"], VARY, 0, {}, "--bodies 0 is not from 1 to 4096"),
-        (["cheetah"], VARY, 5000, {}, "--bodies 5000 is not from 1 to 4096"),
-        (["cheetah", "bear"], VARY, 8, {}, "--vary varies one design, but 2 are named"),
+        (["cheetah"], (), 8, {}, "`bodies` draws designs, but nothing is varied"),
+        (["cheetah"], VARY, None, {}, "`bodies` is missing"),
+        (["cheetah"], VARY, 0, {}, "`bodies` 0 is not from 1 to 4096"),
+        (["cheetah"], VARY, 5000, {}, "`bodies` 5000 is not from 1 to 4096"),
+        (["cheetah", "bear"], VARY, 8, {}, "`vary` varies one design, but 2 are named"),
         (["cheetah"], ("thigh_lenght=0.2:0.4",), 8, {}, "'thigh_lenght' is not a parameter"),
         (["cheetah"], ("thigh_length=0.4:0.2",), 8, {}, "range 0.4:0.2 is empty"),
-        (["cheetah"], VARY, 8, {"thigh_length": 0.3}, "given by --set and by --vary"),
+        (["cheetah"], VARY, 8, {"thigh_length": 0.3}, "given by `values` and by `vary`"),
     ],
 )
 def test_bad_input_is_reported(
@@ -97,7 +97,7 @@ def test_bad_input_is_reported(
 
 
 def test_a_seed_below_zero_is_refused() -> None:
-    with pytest.raises(DraftError, match="--seed -1 is not from 0"):
+    with pytest.raises(DraftError, match="`seed` -1 is not from 0"):
         open_bodies(["cheetah"], VARY, 2, seed=-1)
 
 
@@ -106,7 +106,7 @@ def test_too_few_that_pass_are_reported_with_the_reasons() -> None:
     # Hips so near the trunk that its motors overlap.
     with pytest.raises(DraftError, match=r"only 0 of 1024 drawn bodies pass, not 3") as caught:
         open_bodies(["cheetah"], ("hip_offset=0.03:0.035",), 3)
-    assert "1024 actuator_overlap; narrow the ranges of --vary" in str(caught.value)
+    assert "1024 actuator_overlap; narrow the ranges of `vary`" in str(caught.value)
 
 
 def test_many_designs_at_once_are_members_one_by_one() -> None:

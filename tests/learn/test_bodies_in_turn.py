@@ -149,5 +149,5 @@ def test_a_policy_that_does_not_see_its_design_continues_with_its_own_body_only(
     train(tmp_path / "blind", plan(), 1)
     (other,) = open_bodies(["cheetah"], values={"thigh_length": 0.31}).members
     changed = replace(plan(stage="velocity"), members=(other,))
-    with pytest.raises(DraftError, match="one that was trained with --see-design"):
+    with pytest.raises(DraftError, match="one that was trained with `see_design`"):
         begin(tmp_path / "one", changed, {other.name: "values: {}\n"}, tmp_path / "blind")

@@ -66,7 +66,7 @@ def test_a_result_that_is_there_is_not_measured_again(
         ({"errors": "papr"}, "there is no source of errors 'papr'\n  did you mean 'paper'?"),
         ({"protocol": "walk"}, "there is no protocol 'walk'\n  did you mean 'walking'?"),
         ({"battery": ["swim"]}, "there is no battery 'swim'"),
-        ({"seconds": 0.1}, "--seconds 0.1 is not from 0.5"),
+        ({"seconds": 0.1}, "`seconds` 0.1 is not from 0.5"),
         ({"checkpoint": 5}, "has no checkpoint of iteration 5"),
     ],
 )

@@ -88,8 +88,8 @@ def test_warp_is_taken_where_mjbatch_is_of_another_mujoco() -> None:
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ("missing", "--engine native: mjbatch is not installed"),
-        ("other", "--engine native: mjbatch was built with MuJoCo 3.11.0, and 3.12.0 is"),
+        ("missing", '`engine="native"`: mjbatch is not installed'),
+        ("other", '`engine="native"`: mjbatch was built with MuJoCo 3.11.0, and 3.12.0 is'),
     ],
 )
 def test_native_mujoco_that_is_requested_and_cannot_be_used_is_explained(
@@ -98,14 +98,14 @@ def test_native_mujoco_that_is_requested_and_cannot_be_used_is_explained(
     request.getfixturevalue(how)
     with pytest.raises(DraftError, match=words) as caught:
         choose("native", CPU)
-    assert "use --engine warp, which runs anywhere" in caught.value.problems[0].remedy
+    assert 'use `engine="warp"`, which runs anywhere' in caught.value.problems[0].remedy
 
 
 @pytest.mark.usefixtures("usable")
 def test_native_mujoco_on_gpus_is_refused() -> None:
     with pytest.raises(DraftError, match=r"runs on the CPU, not on cuda:0, cuda:1") as caught:
         choose("native", GPUS)
-    assert caught.value.problems[0].remedy == "add --device cpu, or use --engine warp"
+    assert caught.value.problems[0].remedy == 'add `device="cpu"`, or use `engine="warp"`'
 
 
 @pytest.mark.parametrize(
@@ -181,12 +181,12 @@ def test_gpus_have_a_process_each() -> None:
 @pytest.mark.parametrize(
     ("asked", "worlds", "devices", "words"),
     [
-        (7, 4096, CPU, r"--replicas 7: this machine has 6 physical cores.*\n  choose 1 to 6"),
-        (0, 4096, CPU, r"--replicas 0: .*\n  choose 1 to 6"),
-        (-1, 4096, CPU, r"--replicas -1: .*\n  choose 1 to 6"),
-        (5, 4, CPU, r"--replicas 5: there are only 4 worlds.*\n  add --envs 5 or more"),
-        (2, 4096, GPUS, r"--replicas 2 is for a CPU.*\n  omit --replicas, or add --device cpu"),
-        (1, 4096, GPU, r"--replicas 1 is for a CPU.*\n  omit --replicas, or add --device cpu"),
+        (7, 4096, CPU, r"`replicas` 7: this machine has 6 physical cores.*\n  choose 1 to 6"),
+        (0, 4096, CPU, r"`replicas` 0: .*\n  choose 1 to 6"),
+        (-1, 4096, CPU, r"`replicas` -1: .*\n  choose 1 to 6"),
+        (5, 4, CPU, r"`replicas` 5: there are only 4 worlds.*\n  add `envs=5` or more"),
+        (2, 4096, GPUS, r"`replicas` 2 is for a CPU.*\n  omit `replicas`, or add `device=\"cpu\"`"),
+        (1, 4096, GPU, r"`replicas` 1 is for a CPU.*\n  omit `replicas`, or add `device=\"cpu\"`"),
     ],
 )
 def test_numbers_of_processes_that_cannot_be_are_explained(
@@ -322,7 +322,7 @@ def test_with_a_gpu_pytorch_says_which(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (found.devices, found.on_cpu) == (["cuda:0"], False)
     assert found.engine is not None
     assert found.engine.name == "warp"
-    with pytest.raises(DraftError, match="--engine native runs on the CPU"):
+    with pytest.raises(DraftError, match='`engine="native"` runs on the CPU'):
         this_machine(engine="native")
     monkeypatch.setattr(machine, "devices", lambda word: ["cpu"])
     assert this_machine().on_cpu

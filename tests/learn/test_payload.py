@@ -82,9 +82,9 @@ def test_a_result_with_a_payload_is_beside_that_without(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("numbers", "said"),
     [
-        ({"payload": -1.0}, "--payload -1 is not from 0"),
-        ({"payload": float("nan")}, "--payload nan is not from 0"),
-        ({"regeneration": 1.5}, "--regeneration 1.5 is not a share"),
+        ({"payload": -1.0}, "`payload` -1 is not from 0"),
+        ({"payload": float("nan")}, "`payload` nan is not from 0"),
+        ({"regeneration": 1.5}, "`regeneration` 1.5 is not a share"),
     ],
 )
 def test_bad_numbers_are_refused(numbers: dict[str, float], said: str) -> None:

@@ -14,11 +14,11 @@ from draft.learn.policy.playback import playback
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"command": (math.nan, 0.0, 0.0)}, "--command nan 0 0 is out of range"),
-        ({"step": 2.0}, "--step 2 is not from 0 to 0.6 m"),
-        ({"kick": -3.0}, "--kick -3 is not from 0 to 100 m/s"),
-        ({"seconds": 0.0}, "--seconds 0 is not above 0 and at most 600"),
-        ({"seconds": math.nan}, "--seconds nan is not above 0 and at most 600"),
+        ({"command": (math.nan, 0.0, 0.0)}, "`command` nan 0 0 is out of range"),
+        ({"step": 2.0}, "`step` 2 is not from 0 to 0.6 m"),
+        ({"kick": -3.0}, "`kick` -3 is not from 0 to 100 m/s"),
+        ({"seconds": 0.0}, "`seconds` 0 is not above 0 and at most 600"),
+        ({"seconds": math.nan}, "`seconds` nan is not above 0 and at most 600"),
         ({"skill": "dance"}, "there is no skill 'dance'"),
         ({"policy": "none.onnx"}, "cannot read none.onnx"),
     ],

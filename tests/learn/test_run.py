@@ -90,7 +90,7 @@ def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_no_run_is_explained(tmp_path: Path) -> None:
-    with pytest.raises(DraftError, match="is not a run of 'draft train'"):
+    with pytest.raises(DraftError, match=r"is not a run of `draft\.train`"):
         open_run(tmp_path)
 
 
@@ -227,14 +227,14 @@ def test_how_far_a_run_is_can_be_read_without_torch(tmp_path: Path) -> None:
 
 def test_a_policy_is_described_by_its_iteration_and_what_is_left_to_train(tmp_path: Path) -> None:
     run = create(tmp_path / "a run", plan(), DESIGNS)
-    line, words = run.policy_line, f"'draft train '{tmp_path}/a run'"
+    line, words = run.policy_line, f'`draft.train("{tmp_path}/a run"'
     run.note(47, 60.0, 1, "native", 250)
     assert line(47) == (
-        f"policy: iteration 47 of 250, unfinished: {words} --iterations 250' continues the training"
+        f"policy: iteration 47 of 250, unfinished: {words}, iterations=250)` continues the training"
     )
     assert line(25).endswith("continues the training from 47")
     run.note(47, 60.0, 1, "native", 1200)
-    assert f"{words}' continues" in line(47)
+    assert f"{words})` continues" in line(47)
     run.note(1200, 60.0, 1, "native", 1200)
     assert line(1200) == "policy: iteration 1200 of 1200"
     assert line(25) == f"policy: iteration 25 of 1200, an earlier checkpoint of {run.folder}"

@@ -15,12 +15,12 @@ DIMENSIONS = ("m", "s", "m/s", "rad/s")
 def test_the_numbers_that_do_not_scale_are_told() -> None:
     config = Config()
     same = {
-        group.name: {
+        name: {
             one.name
-            for one in fields(getattr(config, group.name))
+            for one in fields(group)
             if one.metadata["unit"] in DIMENSIONS and not one.metadata["power"]
         }
-        for group in fields(config)
+        for name, group in config.groups().items()
     }
     text = DOCS.read_text(encoding="utf-8").partition("are:\n\n")[2].partition("\n\nSo the")[0]
     told = {

@@ -169,7 +169,7 @@ def test_a_policy_that_can_run_is_tuned_in_a_quarter_of_the_iterations(tmp_path:
         return prepare("cheetah", tmp_path / recipe, recipe=recipe, **words)
 
     usual, tuned = prepared("laptop"), prepared("tune")
-    own = LAPTOP.config.learning.iterations
+    own = LAPTOP.config.iterations
     assert 4 * iterations_of(tuned, None) == own("base") + own("velocity")
     assert tuned.plan.config.velocity.missed > usual.plan.config.velocity.missed == 0
     assert tuned.plan.ground == "flat"
@@ -182,7 +182,7 @@ def test_a_policy_that_can_run_is_tuned_in_a_quarter_of_the_iterations(tmp_path:
 def test_nothing_is_tuned_from_nothing(origin: str | None, tmp_path: Path) -> None:
     with pytest.raises(DraftError, match="recipe tune is for policies that can run") as caught:
         prepare("cheetah", tmp_path / "run", stage="velocity", origin=origin, recipe="tune")
-    assert "--from family" in str(caught.value)
+    assert '`origin="family"`' in str(caught.value)
     assert not (tmp_path / "run").exists()
 
 
@@ -191,8 +191,8 @@ def test_nothing_is_tuned_from_nothing(origin: str | None, tmp_path: Path) -> No
     [
         ("nowhere.onnx", {}, "cannot read nowhere.onnx"),
         ("{file}", {"words": ["bear"]}, "is of another design than quadruped:bear: "),
-        ("{file}", {"see_design": True}, "was trained without --see-design"),
-        ("{file}", {"values": {"learning.hidden": [8, 8]}}, "--set learning.hidden=16,16"),
+        ("{file}", {"see_design": True}, "was trained without `see_design`"),
+        ("{file}", {"values": {"learning.hidden": [8, 8]}}, "`values` learning.hidden=16,16"),
         ("{broken}", {}, "is not a policy that Draft can read"),
     ],
 )

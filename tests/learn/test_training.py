@@ -169,7 +169,7 @@ def test_a_training_that_stops_early_keeps_the_policy_it_reached(
     assert run.checkpoint()[0] == run.done() == 1
     kept = read_checkpoint(run.checkpoint()[1], "cpu")["actor_state_dict"]
     assert same(kept, stopped.runner.alg.save()["actor_state_dict"])
-    assert run.policy_line(1).startswith("policy: iteration 1 of 3, unfinished: 'draft train ")
+    assert run.policy_line(1).startswith("policy: iteration 1 of 3, unfinished: `draft.train(")
     assert same(weights(long(engine)), weights(train(run, 3, engine=engine)))
     assert run.policy_line(3) == "policy: iteration 3 of 3"
 
@@ -307,7 +307,7 @@ def test_numbers_that_are_none_stop_training_and_leave_the_last_state(
 
 def test_mjlab_itself_reads_a_checkpoint(base: tuple[Run, Trainer]) -> None:
     trainer = base[1]
-    numbers = agent_settings(trainer._run.plan.config.learning, "base", seed=5)
+    numbers = agent_settings(trainer._run.plan.config, "base", seed=5)
     runner = MjlabOnPolicyRunner(trainer._wrapped, numbers, None, "cpu")
     runner.load(str(base[0].checkpoint()[1]))
     state = runner.alg.get_policy().state_dict()

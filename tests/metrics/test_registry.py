@@ -127,7 +127,8 @@ def test_two_metrics_of_one_name_are_refused() -> None:
         """Another mass [kg]."""
         return 0.0
 
-    with pytest.raises(ValueError, match="a metric 'mass' exists already"):
+    cause = "the metric 'mass' of tests.metrics.test_registry exists already in draft.metrics.sizes"
+    with pytest.raises(draft.DraftError, match=cause):
         metric(unit="kg", formula="0", source="a test")(mass)
     assert METRICS["mass"].formula.startswith("sum of trunk")
 

@@ -22,7 +22,7 @@ import draft
 from draft.cli import main
 from draft.design.legs import legs
 from draft.design.report import mass_parts, report
-from draft.model.mjcf import COLORS
+from draft.spec.primitives import colors
 from draft.spec.primitives.base import Form, Geom
 from draft.studio.skins import skins
 from tests.helpers import ids, leg, parameter, robot
@@ -251,13 +251,13 @@ def test_the_glb_has_the_block(tmp_path: Path) -> None:
     assert mesh.bounds == pytest.approx(np.array([[-0.1, -0.05, -0.025], [0.1, 0.05, 0.025]]))
     assert mesh.volume == pytest.approx(math.prod(SIZE))
     color = np.array(mesh.visual.material.baseColorFactor[:3]) / 255
-    linear = np.array([((c + 0.055) / 1.055) ** 2.4 for c in COLORS["carried"][:3]])
+    linear = np.array([((c + 0.055) / 1.055) ** 2.4 for c in colors()["carried"][:3]])
     assert color == pytest.approx(linear, abs=1 / 255)
 
 
 def test_the_studio_draws_the_block_in_its_colour() -> None:
     model = carrying({"mass": 1.0}).resolve().build()
-    red, green, blue, _ = (round(255 * c) for c in COLORS["carried"])
+    red, green, blue, _ = (round(255 * c) for c in colors()["carried"])
     skin = skins(model)[red, green, blue]
     assert np.ptp(skin.vertices, axis=0) == pytest.approx(SIZE)
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import draft
 from draft.design.report import report
 from draft.laws.structure import population
-from draft.model.folder import plain
+from draft.values import plain
 from tests.helpers import leg, parameter, robot
 
 TRENDS = population("quadruped").segments

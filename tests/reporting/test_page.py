@@ -196,7 +196,7 @@ def test_metrics_are_compared() -> None:
         metric("seldom", "m", "", lambda d: 1.0 if d.label == "bear" else float("nan")),
     )
     spec = draft.load("quadruped")
-    with patch.dict(METRICS, {one.name: one for one in made}, clear=True):
+    with patch.dict(METRICS._items, {one.name: one for one in made}, clear=True):
         found = subjects([spec.resolve("cheetah"), spec.resolve("bear")])
         reader = read(page(found))
     words = own_words(reader)

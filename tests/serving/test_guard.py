@@ -83,14 +83,14 @@ def test_a_taken_port_is_explained(
         monkeypatch.setattr("draft.serving.server.check_free", lambda host, port: None)
     with pytest.raises(DraftError, match=f"cannot serve on 127.0.0.1 port {server.port}"):
         Server("127.0.0.1", server.port)
-    with pytest.raises(DraftError, match=rf"pass --port {server.port + 1}, or --port 0 for any"):
+    with pytest.raises(DraftError, match=rf"pass `port={server.port + 1}`, or `port=0` for any"):
         Server("127.0.0.1", server.port)
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.2", "example.org", ""])
 def test_a_public_address_needs_a_token(host: str) -> None:
     assert not is_loopback(host)
-    with pytest.raises(DraftError, match="no --token"):
+    with pytest.raises(DraftError, match="no `token`"):
         check_address(host, None)
     check_address(host, TOKEN)
     for bad in ("short", "x" * 15, "with space, and;more", ""):

@@ -33,7 +33,7 @@ ENDS = {
         "wheel": {"radius": 0.1, "width": 0.04, "axis": "y", "density": 464.0, "site": "at"},
     },
 }
-TYPES = sorted(link.type_name() for link in LINKS if link.end is not None)
+TYPES = sorted(link.type_name() for link in LINKS.values() if link.end is not None)
 signs = st.tuples(*[st.sampled_from([-1.0, 1.0])] * 3)
 
 
@@ -52,13 +52,13 @@ def test_every_link_of_the_package_is_in_the_list_once() -> None:
         kinds = inspect.getmembers(module, inspect.isclass)
         own = [kind for _, kind in kinds if kind.__module__ == module.__name__]
         found |= {kind for kind in own if issubclass(kind, LinkBase) and kind is not LinkBase}
-    assert found == set(LINKS)
+    assert found == set(LINKS.values())
     assert len(LINKS) == len(found)
 
 
 def test_types_keys_and_suffixes_of_primitives_differ() -> None:
-    ends = [link.end for link in LINKS if link.end is not None]
-    assert len({link.type_name() for link in LINKS}) == len(LINKS)
+    ends = [link.end for link in LINKS.values() if link.end is not None]
+    assert [link.type_name() for link in LINKS.values()] == [*LINKS]
     assert len({end.key for end in ends}) == len(ends)
     assert set(ENDS) == set(TYPES)
 

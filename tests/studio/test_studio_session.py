@@ -16,7 +16,7 @@ from draft.spec.load import ROBOTS
 from draft.studio import cards, fields, plots, trend_cards
 from draft.studio.drop import HEIGHT, Drop
 from draft.studio.library import Library, Writes
-from draft.studio.page import report_page
+from draft.studio.report_page import report_page
 from draft.studio.session import GESTURE, Point, Session
 from draft.studio.skins import skins
 from draft.values import scalar

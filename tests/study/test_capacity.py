@@ -65,18 +65,18 @@ def test_a_gpu_has_one_process_and_mujoco_warp() -> None:
 
 
 def test_what_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(DraftError, match="--replicas 9: this machine has 8 physical cores"):
+    with pytest.raises(DraftError, match="`replicas` 9: this machine has 8 physical cores"):
         on_cpu(study(LARGE), "auto", 9, None)
-    with pytest.raises(DraftError, match="--replicas 5: a training has 4 worlds to share"):
+    with pytest.raises(DraftError, match="`replicas` 5: a training has 4 worlds to share"):
         on_cpu(study(TEXT), "auto", 5, None)
-    with pytest.raises(DraftError, match="--replicas 0: "):
+    with pytest.raises(DraftError, match="`replicas` 0: "):
         on_cpu(study(TEXT), "auto", 0, None, cluster=True)
-    with pytest.raises(DraftError, match="--replicas 2 is for a CPU"):
+    with pytest.raises(DraftError, match="`replicas` 2 is for a CPU"):
         on_gpus("auto", 2, None)
-    with pytest.raises(DraftError, match="--engine native runs on the CPU, not on cuda"):
+    with pytest.raises(DraftError, match='`engine="native"` runs on the CPU, not on cuda'):
         on_gpus("native", None, None)
     monkeypatch.setattr(machine, "obstacle", lambda: "it is not installed")
-    with pytest.raises(DraftError, match="--engine native: it is not installed"):
+    with pytest.raises(DraftError, match='`engine="native"`: it is not installed'):
         on_cpu(study(LARGE), "native", None, None)
     found = on_cpu(study(LARGE), "auto", None, None)
     assert (found.engine.name, found.processes, found.at_once) == ("warp", 1, 4)

@@ -82,9 +82,9 @@ def test_numbers_of_the_tasks_are_set() -> None:
 def test_a_recipe_is_what_the_other_numbers_start_from() -> None:
     quick = study("designs: [cheetah]\nrecipe: laptop\n")
     assert quick.config == LAPTOP.config
-    learning = LAPTOP.config.learning
-    assert quick.environments == learning.environments < 4096
-    assert [quick.iterations(s) for s in STAGES] == [learning.iterations(s) for s in STAGES]
+    config = LAPTOP.config
+    assert quick.environments == config.learning.environments < 4096
+    assert [quick.iterations(s) for s in STAGES] == [config.iterations(s) for s in STAGES]
     text = "designs: [cheetah]\nrecipe: laptop\niterations: {base: 9}\n"
     text += "set: {learning.kl: 0.02, learning.iterations_push: 7, learning.environments: 64}\n"
     changed = study(text)
@@ -185,3 +185,18 @@ def test_a_file_that_is_no_study_is_refused(tmp_path: Path, text: str | None, wo
         path.write_text(text)
     with pytest.raises(DraftError, match=words):
         read(path)
+
+
+def test_a_stage_of_an_extension_is_trained_after_the_one_that_it_starts_from(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    more = replace(STAGES["push"], name="kicked", origin="push")
+    monkeypatch.setitem(STAGES._items, "kicked", more)
+    assert study("designs: [cheetah]\n").stages == ("base", "velocity", "terrain", "push")
+    text = "designs: [cheetah]\nseeds: 1\niterations: {kicked: 3}\n"
+    found = study(text + "stages: [base, push, kicked]\n")
+    assert found.iterations("kicked") == 3
+    jobs = graph(found, read_groups(found))
+    assert jobs["cheetah-kicked-0"].needs == ("cheetah-push-0",)
+    with pytest.raises(DraftError, match="'push' must come first: 'kicked' starts from it"):
+        study(text + "stages: [base, kicked]\n")

@@ -16,7 +16,7 @@ from draft.learn.engine import machine
 from draft.learn.engine.machine import NATIVE, WARP, Engine, minutes
 from draft.learn.measuring import results
 from draft.learn.task.config import STAGES, Config
-from draft.learn.task.recipes import LAPTOP, RECIPES
+from draft.learn.task.recipes import LAPTOP
 from draft.learn.training import run as runs
 from draft.study import graph as graphs
 from draft.study.capacity import Capacity
@@ -124,13 +124,12 @@ def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
 def test_a_policy_that_saw_the_ground_keeps_seeing_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    recipe = replace(LAPTOP, uneven=("base",))
-    monkeypatch.setitem(RECIPES, "laptop", recipe)
+    monkeypatch.setitem(STAGES._items, "base", replace(STAGES["base"], uneven=True))
     made = jobs(TEXT + "recipe: laptop\n")
     for stage in ("base", "push"):
         job = made[f"bear-{stage}-0"]
         assert isinstance(job, Training)
-        assert (job.plan.ground, job.plan.see_ground) == (recipe.ground(stage), True)
+        assert (job.plan.ground, job.plan.see_ground) == (LAPTOP.ground(stage), True)
         write_output(request_of(job, tmp_path))
         assert job.holds(tmp_path, job.output(tmp_path))
 
@@ -299,7 +298,7 @@ def test_hours_are_steps_by_steps_per_second(tmp_path: Path) -> None:
     assert walk == pytest.approx(2 * 600 / 100 / 3600)
     push = hours(made["bear-push-0-nominal"], tmp_path, rates)
     assert push == pytest.approx(2 * 2 * 600 / 100 / 3600)
-    assert "of --rate" in rates.words()
+    assert "of `rate`" in rates.words()
 
 
 def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ def test_each_gpu_has_a_worker_unless_more_are_asked_for(monkeypatch: pytest.Mon
         found = make_workers(study(), Placement(workers=workers))
         assert [worker.physics for worker in found] == [Physics()] * count
         assert {worker.device for worker in found} == {"cuda"}
-    with pytest.raises(DraftError, match="--replicas 2 is for a CPU"):
+    with pytest.raises(DraftError, match="`replicas` 2 is for a CPU"):
         make_workers(study(), Placement(replicas=2))
 
 
@@ -125,14 +125,14 @@ def test_a_cluster_has_a_worker_per_gpu_or_per_group_of_cores(
 
 def test_a_cluster_without_a_gpu_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "need", lambda name, extra: _Ray(CPU=4.0))
-    with pytest.raises(DraftError, match=r"no GPU\n.*--device cpu"):
+    with pytest.raises(DraftError, match=r"no GPU\n.*`device=\"cpu\"`"):
         make_workers(study(), Placement(ray=True))
 
 
 def test_options_out_of_range_are_refused() -> None:
     for workers in (0, 1025):
-        with pytest.raises(DraftError, match=f"--workers {workers} is not from 1 to 1024"):
+        with pytest.raises(DraftError, match=f"`workers` {workers} is not from 1 to 1024"):
             Placement(workers=workers).check()
-    with pytest.raises(DraftError, match=r"--address is for a Ray cluster\n.*--ray"):
+    with pytest.raises(DraftError, match=r"`address` is for a Ray cluster\n.*`ray`"):
         Placement(address="here:1").check()
     Placement(workers=2, ray=True, address="here:1").check()

@@ -122,9 +122,9 @@ def test_too_short_a_time_limit_does_nothing_and_says_what_is_needed(worker: Fak
 
 def test_bad_options_are_refused_before_anything_is_written() -> None:
     for minutes in (0.0, -1.0, float("nan"), 1e7):
-        with pytest.raises(DraftError, match=r"--minutes .* is not above 0"):
+        with pytest.raises(DraftError, match=r"`minutes` .* is not above 0"):
             run_study("mine.yaml", minutes=minutes)
-    with pytest.raises(DraftError, match="--workers 0 is not from 1"):
+    with pytest.raises(DraftError, match="`workers` 0 is not from 1"):
         run_study("mine.yaml", workers=0)
     with pytest.raises(DraftError, match=r"none\.yaml: file not found"):
         run_study("none.yaml")

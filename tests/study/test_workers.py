@@ -61,7 +61,7 @@ def test_one_process_does_one_job_after_the_other(tmp_path: Path) -> None:
     assert said.startswith(f"train: run {tmp_path}/done, iterations 2, device cpu, engine warp\n")
     assert said.endswith("2 of 2 iterations are done\n")
     said = (tmp_path / "logs/b.log").read_text()
-    assert "error: 'nowhere' is not a run of 'draft train'\n  create one with" in said
+    assert "error: 'nowhere' is not a run of `draft.train`\n  create one with" in said
     assert "Traceback" not in said
     said = (tmp_path / "logs/c.log").read_text()
     assert said.startswith("report: study nowhere\nerror: ")

@@ -10,8 +10,8 @@ import pytest
 
 from docs.twins import by_published_sum
 from draft.files import Content
-from draft.fitting.structure.survey_rows import read
 from draft.laws.residuals import FILE, residuals
+from draft.laws.survey import read
 from draft.twins.compare import compare_twin
 from draft.twins.every import Row, run, score, tasks
 from draft.twins.record import residuals as residuals_of

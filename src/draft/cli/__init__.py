@@ -12,6 +12,7 @@ import importlib
 import keyword
 import os
 import sys
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 
 from draft.errors import DraftError, RefusedError, suggest
@@ -69,6 +70,7 @@ examples:
 exit codes:
   0 done, 1 refused by the design filter, 2 bad input, 70 a fault of Draft, 130 interrupted
 """
+_FORMAT_WARNING = warnings.formatwarning
 _RENDERERS = "unset MUJOCO_GL; 'draft doctor' lists the renderers that draw here"
 
 
@@ -89,6 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         print(f"draft {own_version()}")
         return ACCEPTED
+    warnings.formatwarning = _warning
     try:
         _check_current_folder()
         return _run(args)
@@ -161,17 +164,22 @@ def _call(function: Function, name: str, description: str | None, arguments: lis
     """Call the function of a command with the arguments that tyro reads."""
     import tyro
 
+    from draft.cli.spelling import RUNNING, spelt_error
     from draft.cli.values import registry
 
     _check_options(function, name, arguments)
-    return tyro.cli(
-        function,
-        prog=f"draft {name}",
-        description=description,
-        args=arguments,
-        config=(tyro.conf.FlagCreatePairsOff,),
-        registry=registry,
-    )
+    RUNNING.set(function)
+    try:
+        return tyro.cli(
+            function,
+            prog=f"draft {name}",
+            description=description,
+            args=arguments,
+            config=(tyro.conf.FlagCreatePairsOff,),
+            registry=registry,
+        )
+    except DraftError as error:
+        raise spelt_error(error) from None
 
 
 def _check_options(function: Function, name: str, given: Sequence[str]) -> None:
@@ -232,17 +240,33 @@ def _usage() -> str:
     return _USAGE.format(commands="\n".join(lines))
 
 
+def _warning(
+    message: Warning | str, category: type[Warning], file: str, number: int, line: str | None = None
+) -> str:
+    """Text of a warning: one line about extensions, and Python's about anything else."""
+    from draft.extensions import ExtensionWarning
+
+    if issubclass(category, ExtensionWarning):
+        return f"warning: {message}\n"
+    return _FORMAT_WARNING(message, category, file, number, line)
+
+
 def _fail(message: str) -> int:
     print(f"error: {message}", file=sys.stderr)
     return BAD_INPUT
 
 
 def _fault(error: Exception) -> int:
-    """Report a fault of Draft itself; with DRAFT_TRACEBACK=1 with its traceback."""
+    """Report a fault of Draft itself or of an extension; DRAFT_TRACEBACK=1 adds its traceback."""
     if os.environ.get("DRAFT_TRACEBACK") == "1":
         import traceback
 
         traceback.print_exception(error)
+    from draft.extensions import culprit, reason
+
+    if (one := culprit(error)) is not None:
+        head = f"the extension '{one.name}' of {one.package} {one.version} fails"
+        return _fail(f"{head}: {reason(error)[:400]}\n  DRAFT_TRACEBACK=1 shows where")
     print(
         f"error: this is a fault of Draft: {type(error).__name__}: {str(error)[:400]}\n"
         "  please report it to Draft's developers, with the command and the robot's files; "

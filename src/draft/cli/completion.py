@@ -110,7 +110,16 @@ def _entry(command: str, function: Function, subcommands: tuple[str, ...]) -> En
 
 def arguments(function: Function) -> dict[str, tuple[object, str]]:
     """Return type and metavar of each option of a command, as tyro names it; "" for arguments."""
-    found = {}
+    return {option: (kind, metavar) for _, option, kind, metavar in _arguments(function)}
+
+
+def spellings(function: Function) -> dict[str, str]:
+    """Return the option of each argument of a command's function."""
+    return {name: option for name, option, *_ in _arguments(function) if option}
+
+
+def _arguments(function: Function) -> Iterator[tuple[str, str, object, str]]:
+    """Yield name, option, type and metavar of each argument; the option is "" without one."""
     hints = get_type_hints(function, include_extras=True)
     for name, parameter in inspect.signature(function).parameters.items():
         kind, *markers = (
@@ -120,8 +129,7 @@ def arguments(function: Function) -> dict[str, tuple[object, str]]:
         given = next((text for m in markers if (text := getattr(m, "name", None))), name)
         metavar = next((text for m in markers if (text := getattr(m, "metavar", None))), "")
         positional = parameter.kind is parameter.POSITIONAL_ONLY
-        found["" if positional else f"--{given.replace('_', '-')}"] = kind, metavar
-    return found
+        yield name, "" if positional else f"--{given.replace('_', '-')}", kind, metavar
 
 
 def _without_none(kind: object) -> object:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import tyro
 
 from draft.cli.options import JsonOutput
+from draft.cli.spelling import spelt
 from draft.doctor import Row, examine
 
 
@@ -37,7 +38,7 @@ def _json(rows: list[Row]) -> str:
 
 def _table(rows: list[Row]) -> str:
     """Return a table in Markdown whose columns line up in a terminal too."""
-    cells = [(row.item, " ".join(row.text.split()).replace("|", "\\|")) for row in rows]
+    cells = [(row.item, " ".join(spelt(row.text).split()).replace("|", "\\|")) for row in rows]
     width = max(len(item) for item, _ in cells)
     lines = [f"| {item:<{width}} | {text} |" for item, text in (("item", "found"), *cells)]
     return "\n".join([lines[0], f"|{'-' * (width + 2)}|---|", *lines[1:]])

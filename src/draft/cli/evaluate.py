@@ -11,6 +11,7 @@ import tyro
 
 from draft.cli.interrupted import AGAIN, if_interrupted
 from draft.cli.options import DeviceOption, EngineOption, check_folder
+from draft.cli.spelling import spelt
 from draft.errors import DraftError, counted
 
 if TYPE_CHECKING:
@@ -224,7 +225,7 @@ def _all(evaluations: Sequence[Evaluation], device: str, engine: str, again: boo
     found = []
     for evaluation in evaluations:
         line = evaluation.run.policy_line(evaluation.request.iteration)
-        print(f"{evaluation.run.folder}: {line}", flush=True)
+        print(f"{evaluation.run.folder}: {spelt(line)}", flush=True)
         existing = None if again else evaluation.existing()
         if existing is not None:
             since = upgrades(existing.versions)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from draft.cli.interrupted import AGAIN
+from draft.cli.spelling import spelt
 from draft.design import Design
 from draft.design.references import find_design
 from draft.errors import counted
@@ -78,7 +79,7 @@ def print_policy(policy: str | None) -> None:
     if policy is not None:
         from draft.learn.measuring.policies import open_source
 
-        print(open_source(policy).line, file=sys.stderr, flush=True)
+        print(spelt(open_source(policy).line), file=sys.stderr, flush=True)
 
 
 @contextmanager

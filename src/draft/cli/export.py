@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -18,6 +18,13 @@ from draft.cli.options import (
     check_folder,
     open_design,
 )
+from draft.model.exporters import EXPORTERS, FORMATS
+
+# Those of extensions too: this module is imported for its command alone.
+if TYPE_CHECKING:
+    Format = str
+else:
+    Format = Literal[*EXPORTERS]
 
 
 def main(
@@ -34,14 +41,14 @@ def main(
         ),
     ] = None,
     formats: Annotated[
-        tuple[Literal["urdf", "glb", "mjcf"], ...],
+        tuple[Format, ...],
         tyro.conf.arg(
             name="format",
-            metavar="{urdf,glb,mjcf} ...",
+            metavar=f"{{{','.join(EXPORTERS)}}} ...",
             help="urdf with its mesh and actuators.json, glb, mjcf.",
-            help_behavior_hint="(default: all three)",
+            help_behavior_hint=f"(default: {' '.join(FORMATS)})",
         ),
-    ] = ("urdf", "glb", "mjcf"),
+    ] = FORMATS,
     json: JsonOutput = False,
 ) -> int:
     """Write a robot as URDF with an actuator table, as glTF for viewers, and as MJCF."""

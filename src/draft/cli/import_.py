@@ -12,6 +12,7 @@ import tyro
 
 from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import JsonOutput, KneeDrive, Population, Speeds, Strict, Torques
+from draft.cli.spelling import spelt
 from draft.errors import DraftError, counted
 from draft.files import write
 from draft.imports import summary
@@ -75,11 +76,11 @@ def main(
             "summary": summary.record(found.files, mass),
             "preview": None if picture is None else str(picture),
         }
-        print(json_.dumps(record, indent=1))
+        print(spelt(json_.dumps(record, indent=1)))
     else:
         _print(found)
         for heading, text in summary.summary(found.files, mass):
-            print(textwrap.fill(f"{heading}: {text}", WIDTH, subsequent_indent="  "))
+            print(textwrap.fill(spelt(f"{heading}: {text}"), WIDTH, subsequent_indent="  "))
         if picture is not None:
             print(f"picture: {picture}, the maker's robot on the left")
     return 0
@@ -106,7 +107,7 @@ def _preview(file: Path, found: Imported) -> Path | None:
 
 def _print(found: Imported) -> None:
     for note in found.notes:
-        print(f"warning: {note}")
+        print(f"warning: {spelt(str(note))}")
     if found.ignored:
         print("omitted: " + ", ".join(f"{n} {what}" for what, n in found.ignored.items()))
     kinds = counted(len(found.spec.actuators), "actuator class")

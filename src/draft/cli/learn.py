@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 from rich.table import Table
@@ -28,16 +28,19 @@ OptionalDesign = Annotated[
         help_behavior_hint="(default: none)",
     ),
 ]
-# tyro reads the names of the stages from the type; `draft.learn.task.config.STAGES` are these.
+if TYPE_CHECKING:
+    StageName = str
+else:
+    StageName = Literal[tuple(STAGES)]  # tyro reads the names from the type.
 Stage = Annotated[
-    Literal["base", "velocity", "terrain", "push"] | None,
+    StageName | None,
     tyro.conf.arg(
-        metavar="{base,velocity,terrain,push}",
+        metavar=f"{{{','.join(STAGES)}}}",
         help="Omit numbers that only other stages use.",
         help_behavior_hint="(default: all stages)",
     ),
 ]
-# As for the stages: `draft.learn.task.recipes.RECIPES` are these.
+# tyro reads the names from the type; `draft.learn.task.recipes.RECIPES` are these.
 RecipeName = Annotated[
     Literal["paper", "laptop", "tune"] | None,
     tyro.conf.arg(
@@ -76,7 +79,7 @@ def show(
         group: [_sourced(row, chosen, given) for row in rows]
         for group, rows in config.rows(scale, stage).items()
     }
-    training = outlook(here, chosen, config, [stage] if stage else STAGES)
+    training = outlook(here, chosen, config, [stage] if stage else list(STAGES))
     whys = {n: c.why for n, c in chosen.changes.items() if n not in given}
     if json:
         record = {"design": name, "scale": scale, "stage": stage}
@@ -112,7 +115,7 @@ def _scale(reference: str) -> tuple[str, float]:
 
 def _about(config: Config, group: str) -> str:
     """Return the first line of a group's description."""
-    return (getattr(config, group).__doc__ or "").splitlines()[0]
+    return (config.groups()[group].__doc__ or "").splitlines()[0]
 
 
 def _table(rows: Iterable[Row], design: str | None, scale: float, whys: Mapping[str, str]) -> Table:

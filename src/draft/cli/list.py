@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from rich.table import Table
 from rich.text import Text
 
 from draft.cli.display.verdict import console
+from draft.errors import DraftError
 from draft.spec import load, shipped
 
 
@@ -18,19 +21,21 @@ def main() -> int:
     table.add_column("joints", justify="right")
     table.add_column("about")
     for name in shipped():
-        spec = load(name)
-        default = spec.resolve()
-        table.add_row(
-            name, "", f"{default.mass:.1f}", str(len(default.joints)), Text(spec.doc, style="dim")
-        )
-        for design in spec.designs.values():
-            resolved = spec.resolve(design.name)
-            table.add_row(
-                "",
-                design.name,
-                f"{resolved.mass:.1f}",
-                str(len(resolved.joints)),
-                Text(design.doc, style="dim"),
-            )
+        try:
+            rows = [*_rows(name)]
+        except DraftError as error:
+            # One of an extension; the others are listed all the same.
+            rows = [(name, "", "", "", Text(" ".join(str(error).split()), style="red"))]
+        for row in rows:
+            table.add_row(*row)
     console().print(table)
     return 0
+
+
+def _rows(name: str) -> Iterator[tuple[str | Text, ...]]:
+    """Rows of a robot: its default design, and its named ones."""
+    spec = load(name)
+    for label, text in (("", spec.doc), *((one.name, one.doc) for one in spec.designs.values())):
+        design = spec.resolve(label or None)
+        joints = str(len(design.joints))
+        yield "" if label else name, label, f"{design.mass:.1f}", joints, Text(text, style="dim")

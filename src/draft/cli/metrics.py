@@ -10,7 +10,7 @@ import tyro
 from rich.table import Table
 from rich.text import Text
 
-from draft.cli.display.limits import own_weight
+from draft.cli.display.sustained import own_weight
 from draft.cli.display.verdict import console, verdict
 from draft.cli.explore_options import print_policy
 from draft.cli.interrupted import NOTHING, if_interrupted
@@ -25,7 +25,7 @@ from draft.cli.options import (
 )
 from draft.design import Design
 from draft.errors import DraftError
-from draft.metrics import LEARNED, METRICS, of_design, of_model, of_policy
+from draft.metrics import LEARNED, METRICS, find, of_design, of_model, of_policy
 from draft.metrics.statics import joint_margins
 from draft.values import scalar
 
@@ -37,7 +37,6 @@ OptionalDesign = Annotated[
         help_behavior_hint="(default: list every metric)",
     ),
 ]
-_ALL = METRICS | LEARNED
 ARROWS = {"more": "more is better", "less": "less is better", "": ""}
 
 
@@ -89,7 +88,10 @@ def measure(design: Design) -> dict[str, float]:
 
 def _descriptions() -> list[dict[str, str]]:
     keys = ("name", "unit", "doc", "formula", "source", "better", "needs")
-    return [{key: getattr(metric, key) for key in keys} for metric in _ALL.values()]
+    return [
+        {key: getattr(metric, key) for key in keys}
+        for metric in (*METRICS.values(), *LEARNED.values())
+    ]
 
 
 def _list() -> Table:
@@ -98,7 +100,7 @@ def _list() -> Table:
     table.add_column("metric", style="bold", no_wrap=True)
     table.add_column("unit", no_wrap=True)
     table.add_column("description")
-    for metric in _ALL.values():
+    for metric in (*METRICS.values(), *LEARNED.values()):
         words = Text.assemble(
             f"{metric.doc} {ARROWS[metric.better]}".rstrip(),
             (f"\n{metric.formula}\n{metric.source}", "dim"),
@@ -126,7 +128,7 @@ def _print(
     table.add_column("", no_wrap=True)
     table.add_column("description", style="dim")
     for name, value in found.items():
-        metric = _ALL[name]
+        metric = find(name)
         unit = "" if metric.unit in ("1", "bool") else metric.unit
         shown = _shown(value) if metric.unit != "bool" else ("yes" if value else "no")
         if name == "hold_time" and math.isinf(value):

@@ -20,6 +20,7 @@ from draft.cli.options import (
     TokenOption,
 )
 from draft.cli.play_output import FRAMES, Output, output
+from draft.cli.spelling import spelt
 from draft.design import Design
 from draft.design.references import find_design
 from draft.errors import DraftError, counted, suggest
@@ -173,7 +174,7 @@ def main(
     stepped = choose(engine, [chosen])
     quiet()
     need("mjlab", "learn")
-    print(opened.policy_line(iteration), flush=True)
+    print(spelt(opened.policy_line(iteration)), flush=True)
     from draft.learn.watching.play import Player
 
     # An exported policy needs no ground, and a plane is quick to make.

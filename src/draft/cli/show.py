@@ -7,8 +7,8 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
-from draft.cli.display.limits import print_limits
 from draft.cli.display.record import record
+from draft.cli.display.sustained import print_limits
 from draft.cli.display.verdict import console, print_findings, verdict
 from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
 from draft.design import Design

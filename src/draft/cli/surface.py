@@ -20,6 +20,7 @@ from draft.cli.options import (
     check_folder,
     parse_values,
 )
+from draft.cli.spelling import spelt
 from draft.errors import counted
 from draft.metrics.learned import REPLICAS, SECONDS
 
@@ -70,7 +71,7 @@ def main(
     from draft.learn.measuring.policies import open_source
 
     source = open_source(policy)
-    print(source.line, flush=True)
+    print(spelt(source.line), flush=True)
     robot = find_design(reference, design).resolve(parse_values(values))
     with if_interrupted(NOTHING), x.bar("surface", at_once=True) as progress:
         found = surfaces.surface(

@@ -13,6 +13,7 @@ from rich.table import Table
 from draft import files
 from draft.cli.display.verdict import console
 from draft.cli.options import JsonOutput
+from draft.cli.spelling import spelt
 from draft.errors import counted
 from draft.fitting.printed import RELEASED, Figure
 from draft.fitting.structure.parse import Survey, parse
@@ -42,7 +43,7 @@ def parse_command(
     notes: Annotated[bool, tyro.conf.arg(help="Print every note on every robot.")] = False,
 ) -> int:
     """Read URDF and MJCF descriptions, without meshes, into the segment table."""
-    from draft.fitting.structure import survey_rows as rows
+    from draft.laws import survey as rows
 
     survey = parse(source)
     if survey.rows:
@@ -75,8 +76,8 @@ def fit(
     """Fit the structure trends and score them on robots held out."""
     from draft.fitting.structure import survey_refit as refit
     from draft.fitting.structure import whole
-    from draft.fitting.structure.survey_rows import FILE
     from draft.laws.law import Law
+    from draft.laws.survey import FILE
 
     source = rows or FILE
     fitted = refit.structure_trends(source)
@@ -142,21 +143,21 @@ def _summary(survey: Survey, notes: bool) -> None:
     """Print what was read, and what was omitted and why."""
     out = console()
     for robot, error in survey.failed:
-        out.print(f"[bold red]refused[/] [bold]{escape(robot.key)}[/] {escape(str(error))}")
+        out.print(f"[bold red]refused[/] [bold]{escape(robot.key)}[/] {escape(spelt(str(error)))}")
     for one in survey.parsed:
         if not one.robot.used:
             why = escape(one.robot.reason)
             out.print(f"[yellow]omitted[/] [bold]{escape(one.robot.key)}[/] {why}")
             for problem in one.notes if notes else ():
-                out.print(f"  {escape(str(problem))}")
+                out.print(f"  {escape(spelt(str(problem)))}")
     for one in survey.used:
         if one.notes:
             out.print(f"[yellow]note[/] [bold]{one.robot.key}[/] {len(one.notes)} notes")
         for problem in one.notes if notes else one.notes[:3]:
-            out.print(f"  {escape(str(problem))}")
+            out.print(f"  {escape(spelt(str(problem)))}")
     left = len(survey.parsed) - len(survey.used)
-    people = collections.Counter(one.robot.population for one in survey.used)
-    counts = ", ".join(f"{n} {name}s" for name, n in sorted(people.items()))
+    populations = collections.Counter(one.robot.population for one in survey.used)
+    counts = ", ".join(f"{n} {name}s" for name, n in sorted(populations.items()))
     print(
         f"read {len(survey.parsed)}, used {len(survey.used)}"
         f"{f' ({counts})' if counts else ''}, omitted {left}, refused {len(survey.failed)}"

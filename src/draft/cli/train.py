@@ -19,14 +19,20 @@ from draft.cli.options import (
     check_folder,
     parse_values,
 )
+from draft.cli.spelling import spelt
 from draft.errors import counted, listed
 from draft.extras import check
 from draft.learn.silence import quiet
+from draft.learn.task.stages import STAGES
 from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:
     from draft.learn.training.run import Run
     from draft.learn.training.session import Setting
+
+    StageName = str
+else:
+    StageName = Literal[tuple(STAGES)]  # tyro reads the names from the type.
 
 LOOPBACK = "127.0.0.1"
 
@@ -43,7 +49,7 @@ def main(
     ],
     /,
     stage: Annotated[
-        Literal["base", "velocity", "terrain", "push"],
+        StageName,
         tyro.conf.arg(help="Curriculum; all but base start from a base policy."),
     ] = "base",
     seed: Annotated[int, tyro.conf.arg(metavar="N", help="Seed of everything random.")] = 0,
@@ -232,7 +238,7 @@ def _train(
         return 0
     print(f"{names}: stage {run.plan.stage}, seed {run.plan.seed}, to {run.folder}")
     if (base := training.origin_line(run.plan, run.folder.parent)) is not None:
-        print(base)
+        print(spelt(base))
     print(where.describe(run, total), flush=True)
 
     def kept() -> str:

@@ -25,6 +25,7 @@ from draft.cli.options import (
     Strict,
     Torques,
 )
+from draft.cli.spelling import spelt
 from draft.errors import DraftError
 from draft.extras import check as need_installed
 from draft.imports.options import Options
@@ -133,7 +134,7 @@ def _one(found: Comparison, out: Path | None, json: bool) -> int:
 
     if out is not None:
         make_folder(out)
-    text = json_.dumps(record(found), indent=1)
+    text = spelt(json_.dumps(record(found), indent=1))
     if json:
         print(text)
     else:

@@ -13,10 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from draft.design import filter_units
+from draft.design.checks import extended, kinds
 from draft.design.design import Design
 from draft.design.filter_actuators import ROUNDING, actuator, unused, used
 from draft.design.filter_shape import Frames, below_floor, feet, off_tip, sections
-from draft.design.findings import KINDS, Finding, note
+from draft.design.findings import Finding, note
 from draft.design.legs import count
 from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
@@ -68,6 +69,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         *sections(design),
         *off_tip(design, plan),
         *unused(design),
+        *extended(design),
     ]
     return tuple(with_allowance(_whole_mask(finding, design), design) for finding in found)
 
@@ -82,8 +84,8 @@ def _whole_mask(finding: Finding, design: Design) -> Finding:
 def _check_allow(design: Design) -> None:
     for item, where in design.spec.allow.items():
         kind = item.split(":", 1)[0]
-        if kind not in KINDS or kind == "not_physical":
-            known = [k for k in KINDS if k != "not_physical"]
+        known = kinds().keys() - {"not_physical"}
+        if kind not in known:
             raise ResolveError(
                 Problem(f"'allow' names no finding '{kind}'", where, suggest(kind, known))
             )

@@ -9,48 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from draft.design.checks import is_error
 from draft.errors import listed
 from draft.values import Mask, Value, brief, scalar, some
 
 _NAME = re.compile(r"'[^']*'")
-
-# Meaning by id. Those in ERRORS refuse a design unless the spec allows them.
-KINDS: dict[str, str] = {
-    "torque": "peak torque beyond every catalogue module of a fitting reduction",
-    "torque_density": "peak torque per mass beyond every catalogue module of a fitting reduction",
-    "power_density": "peak power per mass beyond every catalogue module of a fitting reduction",
-    "actuator_overlap": "two consecutive actuators occupy the same space at every joint angle",
-    "wrong_unit": "a stated value far outside what was built, which another unit explains",
-    "cannot_stand": "standing in the home pose needs more than the peak torque of a joint",
-    "no_legs": "no limb reaches the ground: the structure trends are those of robots with legs",
-    "not_physical": "an invalid number: not finite, a length of zero, outside its bounds",
-    "aspect_ratio": "length over diameter outside the catalogue's",
-    "stated_value": "a stated value outside what was built by more than a factor of 3",
-    "joint_range": "a joint with a range of more than two turns",
-    "gear_ratio": "reduction far from what modules of this speed have",
-    "heavy_link": "a stated structural mass above twice the trend's",
-    "actuator_share": "share of actuators in the mass outside the middle 80 % of the population",
-    "total_mass": "total mass outside the 95 % band of robots of this size",
-    "limb_overlap": "two limbs overlap in the neutral pose",
-    "uneven_feet": "feet at different heights in the home pose",
-    "outside_data": "a trend is used outside the range of its data",
-    "thermal": "standing in the home pose needs more than the rated torque of a joint",
-    "below_floor": "a part below the feet in the home pose",
-    "off_tip": "links drawn longer than the distance between their joints, which counts",
-    "trunk_section": "a section of the trunk beside the others by more than its own width",
-    "unused_class": "an actuator class that no joint uses",
-    # Of a simulation: `draft check --simulate`.
-    "start_penetration": "parts inside the floor or each other in the start pose of a simulation",
-    "unstable_servo": "a servo that swings, or with which the simulation diverges",
-    "weak_servo": "a servo whose joint leaves the home pose under the robot's own weight",
-    "falls": "the robot falls while its servos hold the home pose on a floor",
-}
-ERRORS = frozenset(
-    (
-        *("torque", "torque_density", "power_density", "actuator_overlap", "not_physical"),
-        *("wrong_unit", "cannot_stand", "unstable_servo"),
-    )
-)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -62,7 +25,7 @@ class Finding:
         ['torque', 'torque_density', 'power_density', 'actuator_overlap']
 
     Attributes:
-        id: kind of the finding, a key of `KINDS`.
+        id: kind of the finding, see `draft.design.checks.kinds`.
         severity: "error" (refuses the design) or "warning".
         where: actuator class, body, or pair of bodies.
         text: the message, with the placeholders {value} and {limit}.
@@ -143,7 +106,7 @@ def note(
     """Yield a finding if it holds for any design."""
     if not some(mask):
         return
-    severity = "error" if kind in ERRORS else "warning"
+    severity = "error" if is_error(kind) else "warning"
     yield Finding(kind, severity, where, text, value, limit, unit, source, mask)
 
 

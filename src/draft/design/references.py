@@ -11,7 +11,7 @@ from pathlib import Path
 from draft.design.design import Design
 from draft.errors import DraftError, SpecError, suggest
 from draft.spec import Spec
-from draft.spec.load import ROBOTS, load, shipped
+from draft.spec.load import FOLDERS, load, shipped
 from draft.values import Value, scalar
 
 _SAME = 1e-6
@@ -71,16 +71,16 @@ def find_design(reference: Spec | str | Path, design: str | None = None) -> Desi
     if design is None:
         return choice
     if choice.design is not None:
-        cause = f"'{reference}' names a design already, and --design names '{design}'"
-        raise DraftError(cause, "omit --design, or name the robot alone")
+        cause = f"'{reference}' names a design already, and `design` names '{design}'"
+        raise DraftError(cause, "omit `design`, or name the robot alone")
     return replace(choice, design=_named(design))
 
 
 def shipped_designs() -> dict[str, tuple[str, ...]]:
     """Return the names of the designs of each shipped robot, without reading them."""
     return {
-        robot: tuple(sorted(path.stem for path in (ROBOTS / robot / "designs").glob("*.yaml")))
-        for robot in shipped()
+        robot: tuple(sorted(path.stem for path in (folder / "designs").glob("*.yaml")))
+        for robot, folder in sorted(FOLDERS.items())
     }
 
 

@@ -22,7 +22,7 @@ from draft.values import Value, scalar
 
 # Relative difference of masses that are equal but for rounding.
 SAME = 1e-9
-SEGMENTS = "draft/fitting/structure/data/segments.csv"
+SEGMENTS = "draft/laws/data/segments.csv"
 
 
 def report(design: Design) -> dict[str, Any]:

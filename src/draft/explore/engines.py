@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import socket
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from draft.extras import need
 Work = Callable[[int], Any]
 _RETRIES = 20
 _TIMEOUT = 5.0  # [s]
+_START = shlex.join(["ray", "start", "--head"])
 
 
 class Engine(Protocol):
@@ -95,7 +97,7 @@ class RayEngine:
             reason = " ".join(str(error).split())[:200]
             where = f"at '{self.address}'" if self.address else "on this machine"
             cause = f"no Ray cluster answers {where}: {reason}"
-            remedy = "start one with 'ray start --head', or give --address"
+            remedy = f"start one with '{_START}', or give `address`"
             raise DraftError(cause, remedy) from None
         return True
 

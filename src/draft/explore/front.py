@@ -99,7 +99,7 @@ def save(search: Search, entries: list[Entry], out: Path) -> None:
         path = out / "designs" / f"{entry['design']}.yaml"
         if path.exists() and entry["design"] not in old:
             cause = f"'{path}' is not a design of this search; it is kept"
-            raise DraftError(cause, "give another --out")
+            raise DraftError(cause, "give another `out`")
     fixed = dict(search.job.values)
     for entry in entries:
         goals = ", ".join(f"{name} = {value:.6g}" for name, value in entry["goals"].items())

@@ -85,15 +85,15 @@ def goals(spec: Spec, minimise: Sequence[str], maximise: Sequence[str]) -> tuple
         DraftError: there is no goal, one is given twice, or a name is unknown.
     """
     if not (minimise or maximise):
-        remedy = "give --minimise or --maximise, such as --minimise mass"
+        remedy = "give `minimise` or `maximise`, such as `minimise` mass"
         raise DraftError("there is nothing to optimise", remedy)
     found: dict[str, Goal] = {}
-    for option, texts in (("--minimise", minimise), ("--maximise", maximise)):
+    for option, texts in (("`minimise`", minimise), ("`maximise`", maximise)):
         for text in texts:
             if text in found:
                 raise DraftError(f"the goal '{text}' is given twice", "give it once")
             value = where.condition(spec, text, option)
-            found[text] = Goal(text, option == "--minimise", value)
+            found[text] = Goal(text, option == "`minimise`", value)
     return tuple(found.values())
 
 
@@ -105,7 +105,7 @@ def constraints(spec: Spec, texts: Sequence[str]) -> tuple[Constraint, ...]:
     """
     found: list[Constraint] = []
     for text in texts:
-        where.condition(spec, text, "--subject-to")  # reports errors with their column
+        where.condition(spec, text, "`subject_to`")  # reports errors with their column
         for node in _conjuncts(syntax_tree(text.strip()).body):
             found.append(_constraint(spec, node))
     return tuple(found)
@@ -119,7 +119,7 @@ def _conjuncts(node: ast.expr) -> list[ast.expr]:
 
 def _constraint(spec: Spec, node: ast.expr) -> Constraint:
     def condition(part: ast.expr) -> Condition:
-        return where.condition(spec, ast.unparse(part), "--subject-to")
+        return where.condition(spec, ast.unparse(part), "`subject_to`")
 
     gap = None
     match node:

@@ -15,10 +15,12 @@ from typing import Any
 
 from draft import metrics as m
 from draft.design import Design
+from draft.design.checks import CHECKS
 from draft.errors import DraftError
 from draft.explore import sample, vary, where
 from draft.explore.vary import Axis
 from draft.explore.where import Condition
+from draft.extensions import load
 from draft.extras import own_version
 from draft.laws import actuators, catalogue, structure
 from draft.metrics.learned import digest
@@ -99,13 +101,17 @@ class Job:
         read = [*self.metrics, *read]
         if self.where:
             read += where.condition(opened(self), self.where).metrics
-        learned: dict[str, Any] = {}
+        more: dict[str, Any] = {}
         if needs_policy(read):
             first = self.resolve(self.draw(0, 1))[0]
-            learned["policy"] = self.digest or digest(self.policy, first)
+            more["policy"] = self.digest or digest(self.policy, first)
             if self.outside:
-                learned["outside"] = True
-        return learned | {
+                more["outside"] = True
+        if extensions := {one.package: one.version for one in load() if not one.problem}:
+            more["extensions"] = extensions
+        if CHECKS:
+            more["checks"] = list(CHECKS)
+        return more | {
             "format": FORMAT,
             "command": self.kind,
             "draft": own_version(),
@@ -161,7 +167,7 @@ def make(
     axes = vary.parse(spec, varied, fixed)
     count = sample.rounded(axes, sampler, whole(n))
     if not 0 <= seed < _SEED_END:
-        raise DraftError(f"--seed {seed} is not from 0 to 2**63 - 1", "such as 0")
+        raise DraftError(f"`seed` {seed} is not from 0 to 2**63 - 1", "such as 0")
     if condition:
         where.condition(spec, condition)
     names = _metrics(kind, metrics, axes)
@@ -200,7 +206,7 @@ def whole(n: str | float) -> int:
         number, count = 0.5, 0
     if count != number or count < 1:
         remedy = "give a whole number above zero, such as 1e6"
-        raise DraftError(f"--n {n} is not a number of designs", remedy)
+        raise DraftError(f"`n` {n} is not a number of designs", remedy)
     return count
 
 
@@ -225,7 +231,7 @@ def _metrics(kind: str, names: Sequence[str] | None, axes: Sequence[Axis]) -> tu
     clashes = {axis.name for axis in axes} & {*chosen, "index", where.ACCEPTED, "findings"}
     if clashes:
         cause = f"'{min(clashes)}' is the name of a varied parameter and of another column"
-        raise DraftError(cause, "rename the parameter, or omit it from --metrics")
+        raise DraftError(cause, "rename the parameter, or omit it from `metrics`")
     return tuple(chosen)
 
 

@@ -111,7 +111,7 @@ def run_search(
     optuna = need("optuna")
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     if not 1 <= search.trials <= _MAX_TRIALS:
-        cause = f"--trials {search.trials} is not from 1 to {_MAX_TRIALS}"
+        cause = f"`trials` {search.trials} is not from 1 to {_MAX_TRIALS}"
         raise DraftError(cause, "such as 2000")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Optuna marks some of these features as experimental

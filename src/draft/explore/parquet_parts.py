@@ -81,7 +81,7 @@ class Parts:
         path = self.folder / MANIFEST
         if self.folder.exists() and not path.is_file() and _has_other_files(self.folder):
             cause = f"'{self.folder}' is not a folder of a Draft run; it is kept"
-            raise DraftError(cause, "choose another --out")
+            raise DraftError(cause, "choose another `out`")
         with files.held(self.folder, f"draft {self.manifest['command']}"):
             new = not path.is_file()
             if new:
@@ -173,7 +173,7 @@ def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], what: str) -
     ]
     verb = "differs" if len(names) == 1 else "differ"
     cause = f"'{what}' belongs to another run: {', '.join(shown)} {verb}"
-    raise DraftError(cause, "choose another --out, or remove it")
+    raise DraftError(cause, "choose another `out`, or remove it")
 
 
 def _dictionary_columns(pa: Any, schema: pyarrow.Schema) -> list[str]:
@@ -188,7 +188,7 @@ def _read_manifest(path: Path) -> dict[str, Any]:
         found = None
     if not isinstance(found, dict):
         cause = f"{path} is not the manifest of a run"
-        raise DraftError(cause, "choose another --out, or remove the folder")
+        raise DraftError(cause, "choose another `out`, or remove the folder")
     return found
 
 

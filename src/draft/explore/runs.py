@@ -1,7 +1,4 @@
-"""Screens, sweeps and searches of one robot, by its name and a few arguments.
-
-Error messages spell an argument as the option of the command: `--out` is `out`.
-"""
+"""Screens, sweeps and searches of one robot, by its name and a few arguments."""
 
 from __future__ import annotations
 
@@ -155,7 +152,7 @@ def screen(
 
     Returns:
         Counts, and the table by `Rows.table`: `index`, the varied numbers, the metrics,
-        `accepted`, `findings` (bit k for kind k of `draft.design.findings.KINDS`), `refused_by`.
+        `accepted`, `findings` (bit k for kind k of `draft.design.checks.kinds()`), `refused_by`.
 
     Raises:
         DraftError: an argument is invalid, the file belongs to another run, the disk is full, or
@@ -163,7 +160,7 @@ def screen(
     """
     path = Path(out)
     if not path.name or path.is_dir():
-        cause = f"--out '{out}' is a folder"
+        cause = f"`out` '{out}' is a folder"
         raise DraftError(cause, "name a file, such as screen.parquet")
     job = _job(robot, "screen", vary, n, values, sampler, seed, where, metrics, CHUNK)
     summary = run_screen(job, path, _local(job, workers), _watch(progress, job.n))
@@ -380,7 +377,7 @@ def _job(
 
 def _local(job: Job, workers: int) -> LocalEngine:
     if not 1 <= workers <= _MOST_WORKERS:
-        cause = f"--workers {workers} is not from 1 to {_MOST_WORKERS}"
+        cause = f"`workers` {workers} is not from 1 to {_MOST_WORKERS}"
         raise DraftError(cause, "such as 2")
     return LocalEngine(min(workers, job.parts))
 
@@ -396,7 +393,7 @@ def _rows(out: Path, summary: Summary) -> Rows:
 def _folder(out: str | Path) -> Path:
     """Refuse an empty name, which as a path would be the current folder."""
     if not str(out).strip():
-        raise DraftError("--out names no folder", "name one")
+        raise DraftError("`out` names no folder", "name one")
     return Path(out)
 
 

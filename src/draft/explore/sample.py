@@ -93,7 +93,7 @@ def _sobol(axes: int, n: int, seed: int, start: int, count: int) -> Array:
         cause = (
             f"{axes} varied numbers are too many for a Sobol sequence ({qmc.Sobol.MAXDIM} at most)"
         )
-        raise DraftError(cause, "use --sampler random")
+        raise DraftError(cause, 'use `sampler="random"`')
     with warnings.catch_warnings():
         # scipy warns of a block that is not a power of two; only the whole sequence matters.
         warnings.simplefilter("ignore", UserWarning)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from draft import metrics as m
 from draft.design import Design
-from draft.design.findings import ERRORS, KINDS
+from draft.design.checks import is_error, kinds
 from draft.errors import DraftError
 from draft.explore.engines import Engine, LocalEngine
 from draft.explore.job import MAX_ROWS, Job
@@ -24,8 +24,6 @@ from draft.values import Value
 
 CHUNK = 20_000  # designs per part; the fastest, because the arrays fit the caches
 FEW = 0.3  # share of the designs of a part below which it is quicker to resolve them again
-_KINDS = tuple(KINDS)
-_REFUSALS = tuple(kind for kind in _KINDS if kind in ERRORS)
 
 Watch = Callable[[int], object]
 
@@ -83,34 +81,44 @@ def verdict(design: Design, rows: NDArray[np.intp]) -> dict[str, Any]:
     """Columns with the verdict of the design filter for some rows of N designs.
 
     Returns:
-        `accepted`, a mask; `findings`, with bit k for kind k of `KINDS`; `refused_by`, the kind of
-        the first error, or null.
+        `accepted`, a mask; `findings`, with bit k for kind k of `kinds()`; `refused_by`, the kind
+        of the first error, or null.
     """
     pa = need("pyarrow")
-    bits = np.zeros(len(rows), dtype=np.uint32)
+    known = tuple(kinds())
+    refusals = _refusals()
+    # One bit for each kind; extensions add some.
+    whole = np.uint32 if len(known) <= 32 else np.uint64
+    bits = np.zeros(len(rows), dtype=whole)
     first = np.full(len(rows), -1, dtype=np.int8)
     for finding in design.findings:
         mask = np.broadcast_to(np.asarray(finding.mask), (design.count or 1,))[rows]
-        bits |= mask * np.uint32(1 << _KINDS.index(finding.id))
+        bits |= mask * whole(1 << known.index(finding.id))
         if finding.severity == "error":
-            first[mask & (first < 0)] = _REFUSALS.index(finding.id)
+            first[mask & (first < 0)] = refusals.index(finding.id)
     codes = pa.array(first, mask=first < 0)
     return {
         "accepted": np.asarray(design.accepted)[rows],
         "findings": bits,
-        "refused_by": pa.DictionaryArray.from_arrays(codes, pa.array(_REFUSALS)),
+        "refused_by": pa.DictionaryArray.from_arrays(codes, pa.array(refusals)),
     }
+
+
+def _refusals() -> tuple[str, ...]:
+    """Kinds of findings that refuse a design."""
+    return tuple(filter(is_error, kinds()))
 
 
 def summarise(columns: Mapping[str, Any], count: int) -> Summary:
     """Summary of a part: designs drawn, rows kept, accepted, and refused by kind of error."""
     codes = columns["refused_by"].indices.drop_null().to_numpy()
-    counts = np.bincount(codes, minlength=len(_REFUSALS))
+    refusals = _refusals()
+    counts = np.bincount(codes, minlength=len(refusals))
     return {
         "designs": count,
         "rows": len(columns["index"]),
         "accepted": int(np.count_nonzero(columns["accepted"])),
-        "refused_by": {k: int(c) for k, c in zip(_REFUSALS, counts, strict=True) if c},
+        "refused_by": {k: int(c) for k, c in zip(refusals, counts, strict=True) if c},
     }
 
 
@@ -153,15 +161,15 @@ def run_screen(
     if out.exists():
         found = about(out)
         if "manifest" not in found:
-            cause = f"'{out}' exists and was not written by 'draft screen'; it is kept"
-            raise DraftError(cause, "choose another --out")
+            cause = f"'{out}' exists and was not written by `draft.screen`; it is kept"
+            raise DraftError(cause, "choose another `out`")
         check_same(found["manifest"], manifest, str(out))
         watch(job.n)
         return found["summary"] | {"computed": 0, "seconds": 0.0}
     with Parts(out.with_name(out.name + ".parts"), manifest, job.parts).held() as parts:
         computed = fill(parts, Screen(job), engine or LocalEngine(), watch)
         summary = total(parts.done)
-        parts.merge(out, {"summary": summary, "findings": list(_KINDS)})
+        parts.merge(out, {"summary": summary, "findings": list(kinds())})
     return summary | {"computed": computed, "seconds": time.perf_counter() - start}
 
 
@@ -198,7 +206,7 @@ def check_size(job: Job, out: Path) -> None:
     if job.n <= MAX_ROWS and (job.where or size <= free):
         return
     cause = f"{job.n:.3g} designs take up to {_bytes(size)} of disk; {_bytes(free)} are free"
-    remedy = f"lower --n{_grid(job)}, ask for fewer --metrics, or drop rows with --where"
+    remedy = f"lower `n`{_grid(job)}, ask for fewer `metrics`, or drop rows with `where`"
     if job.n > MAX_ROWS:
         cause += f", and a run has at most {MAX_ROWS:.0e}"
     raise DraftError(cause, remedy)

@@ -55,7 +55,7 @@ class SqliteLog:
         tables = {name for (name,) in self._log.execute("SELECT name FROM sqlite_master")}
         if "studies" in tables:
             cause = f"'{path}' is a database of Optuna, not a log of this version; it is kept"
-            remedy = f"choose another --out, or add --storage sqlite:///{path}"
+            remedy = f"choose another `out`, or add `storage` sqlite:///{path}"
             raise DraftError(cause, remedy)
         self._log.execute("CREATE TABLE IF NOT EXISTS log (number INTEGER PRIMARY KEY, entry TEXT)")
 
@@ -146,5 +146,5 @@ def open_storage(
     except Exception as error:  # of SQLAlchemy, its drivers, or the file system
         reason = " ".join(str(error).split())[:200]
         cause = f"cannot open the study at '{url or out}': {reason}"
-        remedy = "give another --out, or --storage such as sqlite:///search.db"
+        remedy = "give another `out`, or `storage` such as sqlite:///search.db"
         raise DraftError(cause, remedy) from None

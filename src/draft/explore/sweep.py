@@ -183,8 +183,8 @@ def run_sweep(
     """
     need("pyarrow")
     if out.exists() and not out.is_dir():
-        remedy = "choose another --out"
-        raise DraftError(f"--out '{out}' exists and is not a folder", remedy)
+        remedy = "choose another `out`"
+        raise DraftError(f"`out` '{out}' exists and is not a folder", remedy)
     check_size(job, out)
     start = time.perf_counter()
     with Parts(out, job.manifest(), job.parts).held() as parts:

@@ -68,21 +68,21 @@ def parse(
         spec: the robot.
         vary: (low, high), (low, high, "log") or a list of values by name; or words such as
             `thigh_length=0.2:0.7`.
-        fixed: names with a fixed value, from `--set`.
+        fixed: names with a fixed value.
 
     Raises:
         DraftError: a range has another form, a name is unknown, or a range exceeds that of its
             parameter.
     """
     if not len(vary):
-        raise DraftError("nothing is varied", f"give --vary; {FORM}")
+        raise DraftError("nothing is varied", f"give `vary`; {FORM}")
     axes: dict[str, Axis] = {}
     for name, given, word in _ranges(vary):
         axis = _axis(spec, name, given, word)
         if axis.name in axes:
-            raise DraftError(f"--vary gives '{axis.name}' twice", "give it once")
+            raise DraftError(f"`vary` gives '{axis.name}' twice", "give it once")
         if axis.name in fixed:
-            cause = f"'{axis.name}' is given by --set and by --vary"
+            cause = f"'{axis.name}' is given by `values` and by `vary`"
             raise DraftError(cause, "omit one of them")
         axes[axis.name] = axis
     return tuple(axes.values())
@@ -114,22 +114,22 @@ def unit_of(spec: Spec, name: str) -> str:
 
 def _axis(spec: Spec, name: str, given: object, word: str) -> Axis:
     if word and not (name and given):
-        raise DraftError(f"--vary '{word}' gives no range", FORM)
+        raise DraftError(f"`vary` '{word}' gives no range", FORM)
     problem = key_problem(spec, name, None)
     if problem is not None:
-        raise DraftError(f"--vary: {problem.cause}", problem.remedy)
+        raise DraftError(f"`vary`: {problem.cause}", problem.remedy)
     if name.endswith(".like"):
         cause = f"'{name}' is a catalogue part, not a number"
-        raise DraftError(f"--vary: {cause}", f"run once for each, with --set {name}")
+        raise DraftError(f"`vary`: {cause}", f"run once for each, with `values` {name}")
     axis = _of_text(name, str(given), word) if word else _of_numbers(name, given)
     text = str(given) if word else axis.record()
     if not axis.values:
         word = word or f"{name}={text}"
         if not axis.low < axis.high:
-            cause = f"--vary '{word}': the range {axis.low:g}:{axis.high:g} is empty"
+            cause = f"`vary` '{word}': the range {axis.low:g}:{axis.high:g} is empty"
             raise DraftError(cause, "write the lower end first")
         if axis.log and axis.low <= 0:
-            cause = f"--vary '{word}': a logarithmic range cannot start at {axis.low:g}"
+            cause = f"`vary` '{word}': a logarithmic range cannot start at {axis.low:g}"
             raise DraftError(cause, "start above zero, or omit 'log'")
     _check_bounds(spec, axis, text)
     return axis
@@ -165,7 +165,7 @@ def _of_text(name: str, text: str, word: str) -> Axis:
         return Axis(name, min(values), max(values), values=values)
     low, high, *more = text.split(":")
     if more not in ([], ["log"]):
-        raise DraftError(f"--vary '{word}': '{':'.join(more)}' is not 'log'", FORM)
+        raise DraftError(f"`vary` '{word}': '{':'.join(more)}' is not 'log'", FORM)
     return Axis(name, _number(word, low), _number(word, high), log=bool(more))
 
 
@@ -175,7 +175,7 @@ def _number(word: str, text: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        cause = f"--vary '{word}': '{text.strip()}' is not a number"
+        cause = f"`vary` '{word}': '{text.strip()}' is not a number"
         raise DraftError(cause, FORM)
     return number
 
@@ -186,7 +186,7 @@ def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
         zero = QUANTITIES[axis.name.rsplit(".", 1)[1]].may_be_zero
         if axis.low < 0 or (axis.low == 0 and not zero):
             least = "zero or more" if zero else "above zero"
-            cause = f"--vary '{axis.name}={text}': it must be {least}"
+            cause = f"`vary` '{axis.name}={text}': it must be {least}"
             raise DraftError(cause, "raise the lower end")
         return
     if parameter.bounds is None:
@@ -195,7 +195,7 @@ def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
     if axis.low < low or axis.high > high:
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
         raise DraftError(
-            f"--vary '{axis.name}={text}' leaves the range [{low:g}, {high:g}]{unit} "
+            f"`vary` '{axis.name}={text}' leaves the range [{low:g}, {high:g}]{unit} "
             f"of '{axis.name}'",
             f"stay inside it, or change it at {parameter.where}",
         )

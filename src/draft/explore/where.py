@@ -1,4 +1,4 @@
-"""Conditions on designs, as in `--where`.
+"""Conditions on designs.
 
 A condition is an expression, in the language of specs, of parameters, values of actuator classes
 (`leg.mass`), metrics and `accepted`.
@@ -55,7 +55,7 @@ class Condition:
             ResolveError: it is undefined for every design.
         """
         env = {name: _read(design, name, metrics) for name in self.expression.names}
-        return self.expression.value(env, "--where")
+        return self.expression.value(env, "`where`")
 
     def holds(self, design: Design, metrics: Mapping[str, Value]) -> NDArray[np.bool_]:
         """Mask of the designs whose value is defined and not zero, shape (N,), or (1,) for one."""
@@ -63,7 +63,7 @@ class Condition:
         return np.broadcast_to((value != 0) & ~np.isnan(value), (design.count or 1,))
 
 
-def condition(spec: Spec, text: str, option: str = "--where") -> Condition:
+def condition(spec: Spec, text: str, option: str = "`where`") -> Condition:
     """Parse a condition.
 
     Args:

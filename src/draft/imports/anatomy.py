@@ -12,10 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from draft.description.segments import CLOSE, TOLERANCE
-from draft.fitting.structure import classes, roles
 from draft.imports import slides
 from draft.imports.limbs import ARM_HINGES, Limbs, is_leg
 from draft.imports.reduce import Body, Reduced, collapse, reroot
+from draft.laws import joint_roles as roles
+from draft.laws import segment_classes as classes
 
 LEG = ("hip", "knee", "ankle")
 ARM = ("shoulder", "elbow", "wrist")

@@ -17,7 +17,6 @@ import numpy as np
 from draft.description.segments import CLOSE
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem, listed
-from draft.fitting.structure.torques import TorqueLaw, torque_laws
 from draft.imports.anatomy import SPINE
 from draft.imports.options import Options
 from draft.imports.reduce import Body, Reduced
@@ -25,6 +24,7 @@ from draft.imports.shapes import Shapes
 from draft.imports.speeds import FASTEST, SLOWEST, surveyed_speed
 from draft.laws.actuators import laws
 from draft.laws.catalogue import extremes
+from draft.laws.joint_torques import TorqueLaw, torque_laws
 
 # Standard deviations of ln(torque) beyond which a declared torque is no drive of such a joint. All
 # 49 robots of the fits stay below 2.6.
@@ -75,13 +75,13 @@ class Drive:
 
 
 def drives(
-    reduced: Reduced, people: str, options: Options, shapes: Shapes | None = None
+    reduced: Reduced, population: str, options: Options, shapes: Shapes | None = None
 ) -> dict[str, Drive]:
     """Torque and speed of every driven hinge by its name, with notes on those that are replaced.
 
     Args:
         reduced: the robot.
-        people: "humanoid" or "quadruped".
+        population: "humanoid" or "quadruped".
         options: what a person decides.
         shapes: its shapes: a torque that is guessed is that of no drive wider than its limb.
 
@@ -91,16 +91,16 @@ def drives(
     """
     bodies = [one for one in reduced.root.all() if one.joint is not None and not one.slides]
     named = {body.joint.name: body.role for body in bodies if body.joint}
-    options.torque.check(named, "--torque")
-    options.speed.check(named, "--speed")
-    expected = Expected(reduced, people, options, shapes)
+    options.torque.check(named, "`torque`")
+    options.speed.check(named, "`speed`")
+    expected = Expected(reduced, population, options, shapes)
     doubted = _doubted(bodies, expected, options)
     if doubted and options.strict:
         raise DescriptionError([_refusal(body, expected) for body in doubted[:LISTED]])
     found: dict[str, Drive] = {}
     for body in bodies:
         one = _torque(body, expected, options, body in doubted)
-        found[one.joint] = _speed(body, one, people, options)
+        found[one.joint] = _speed(body, one, population, options)
     _tell(reduced, bodies, found, expected)
     return found
 
@@ -109,13 +109,13 @@ class Expected:
     """Torque that surveyed joints of a body's role have on a robot of this size."""
 
     def __init__(
-        self, reduced: Reduced, people: str, options: Options, shapes: Shapes | None = None
+        self, reduced: Reduced, population: str, options: Options, shapes: Shapes | None = None
     ) -> None:
         self.leg = leg_length(reduced)
-        self.people, self.shapes = people, shapes
+        self.population, self.shapes = population, shapes
         # Widest link so far of each limb [m], and its bodies that were not measured yet.
         self._widths: dict[Body, tuple[float, list[Body]]] = {}
-        self.laws = torque_laws(people, frozenset(options.without))
+        self.laws = torque_laws(population, frozenset(options.without))
         self.elbow = torque_laws("humanoid", frozenset(options.without))["elbow"]
 
     def torque(self, body: Body) -> float:
@@ -156,7 +156,7 @@ class Expected:
     def diameter(self, torque: float) -> float:
         """Diameter of a drive of a torque [m], at the speed of surveyed joints of that torque."""
         trends = laws().trends
-        reduction = float(trends["gear_ratio"](surveyed_speed(torque, self.people)))
+        reduction = float(trends["gear_ratio"](surveyed_speed(torque, self.population)))
         aspect = float(trends["aspect_ratio"](reduction))
         return 2 * (float(trends["volume"](torque, reduction)) / (2 * math.pi * aspect)) ** (1 / 3)
 
@@ -283,7 +283,7 @@ def _refusal(body: Body, expected: Expected) -> Problem:
     name, where = (joint.name, joint.where) if joint is not None else ("", None)
     cause = f"joint '{name}' declares {declared(body):g} N m, where {expected.words(body)} have "
     cause += f"about {expected.torque(body):g}"
-    return Problem(cause, where, f"state it, --torque {name}=VALUE, or import without --strict")
+    return Problem(cause, where, f"state it, `torque` {name}=VALUE, or import without `strict`")
 
 
 def _torque(body: Body, expected: Expected, options: Options, doubted: bool) -> Drive:
@@ -306,7 +306,7 @@ def _torque(body: Body, expected: Expected, options: Options, doubted: bool) -> 
     return replace(one, slim=expected.slim(body, one.torque))
 
 
-def _speed(body: Body, drive: Drive, people: str, options: Options) -> Drive:
+def _speed(body: Body, drive: Drive, population: str, options: Options) -> Drive:
     """Give a drive its speed."""
     stated = options.speed.value(drive.joint, body.role)
     if stated is not None:
@@ -317,7 +317,7 @@ def _speed(body: Body, drive: Drive, people: str, options: Options) -> Drive:
     if options.speed.every is not None:
         return replace(drive, speed=_round(options.speed.every), speed_from="stated")
     source = "assumed" if math.isnan(drive.speed) else "replaced"
-    speed = surveyed_speed(drive.torque, people)
+    speed = surveyed_speed(drive.torque, population)
     return replace(drive, speed=_round(speed), speed_from=source)
 
 
@@ -344,7 +344,7 @@ def _tell(
         cause = f"{_joints(joints)}: {was:g} N m is implausible and replaced by {now:g}"
         cause += expected.why(body)
         at = body.joint.where if body.joint is not None else where
-        remedy = f"state it, --torque {joints[0]}=VALUE, or refuse such files with --strict"
+        remedy = f"state it, `torque` {joints[0]}=VALUE, or refuse such files with `strict`"
         reduced.notes.append(Problem(cause, at, remedy))
     assumed = [one for one in found.values() if one.torque_from == "assumed"]
     if assumed:
@@ -354,7 +354,7 @@ def _tell(
         cause = f"{len(assumed)} of {len(found)} drives declare no torque: they get that of "
         cause += f"surveyed joints of their role and size, {', '.join(list(torques)[:LISTED])} N m"
         own = [one.joint for one in assumed]
-        remedy = f"state them, {example('--torque', 17, reduced, own)}"
+        remedy = f"state them, {example('`torque`', 17, reduced, own)}"
         reduced.notes.append(Problem(cause, where, remedy))
     _tell_speeds(reduced, by_name, found)
 
@@ -371,7 +371,7 @@ def _tell_speeds(reduced: Reduced, by_name: dict[str, Body], found: dict[str, Dr
         cause = f"{_joints([one.joint for one in own])} declare{'s' * (len(own) == 1)} a speed of "
         cause += f"{value:g} rad/s: it is not used"
         remedy = f"usable: {SLOWEST} to {FASTEST:g} rad/s, at a power that modules have; "
-        remedy += f"{own[0].speed:g} is usual for {own[0].torque:g} N m; state it with --speed"
+        remedy += f"{own[0].speed:g} is usual for {own[0].torque:g} N m; state it with `speed`"
         reduced.notes.append(Problem(cause, joint.where if joint else None, remedy))
 
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 from draft.design import Design
 from draft.design.loads import home_loads, loads
 from draft.design.widened import UNLIKE, Doubts, ExpectedMass, widened
-from draft.fitting.structure.torques import torque_laws
 from draft.imports.drives import leg_length
 from draft.imports.volumes import is_slim
 from draft.laws.beyond import beyond
+from draft.laws.joint_torques import torque_laws
 from draft.laws.structure import LEGS
 from draft.values import scalar
 
@@ -63,15 +63,15 @@ def overload(design: Design) -> float:
 
 def _unlike(files: Files) -> str:
     """In what the robot is unlike those that its trends are fitted to; "" for nothing."""
-    people, legs = files.population, files.limbs.legs
+    population, legs = files.population, files.limbs.legs
     if not legs:
         return "the surveyed robots have legs"
-    if legs != LEGS[people]:
-        return f"surveyed {people}s have {LEGS[people]} legs, not {legs}"
+    if legs != LEGS[population]:
+        return f"surveyed {population}s have {LEGS[population]} legs, not {legs}"
     if is_slim(files.drives):
         return "its limbs are slimmer than the drives of surveyed robots"
     leg = leg_length(files.reduced)
-    laws = torque_laws(people).values()
+    laws = torque_laws(population).values()
     low, high = min(law.legs[0] for law in laws), max(law.legs[1] for law in laws)
     if leg and not low / BEYOND <= leg <= high * BEYOND:
         return f"its legs of {leg:.2g} m are outside the surveyed {low:.2g} to {high:.2g} m"

@@ -22,7 +22,7 @@ from draft.errors import (
     suggest,
 )
 from draft.files import new_folder
-from draft.imports import limits, names, notes, parts, sides, summary, trunk, write
+from draft.imports import names, notes, parts, plausibility, sides, summary, trunk, write
 from draft.imports.anatomy import analyse
 from draft.imports.drives import Drive, drives, example
 from draft.imports.expected import doubts, expected_mass
@@ -163,7 +163,7 @@ def import_robot(
         if not name.isprintable() or any("\ud800" <= letter <= "\udfff" for letter in name):
             raise DraftError(f"{name!a} is no name in UTF-8", "rename it")
     if os.path.lexists(folder) or folder.name == "..":
-        raise DraftError(f"'{folder}' exists; it is kept", "choose another --out")
+        raise DraftError(f"'{folder}' exists; it is kept", "choose another `out`")
     files = translate(source, names.valid(folder.name, "robot"), population, options=options)
     geometry = _make(folder, files)
     reduced = files.reduced
@@ -193,7 +193,7 @@ def check_population(population: str | None) -> None:
 def translate(
     source: Source | Path,
     name: str,
-    people: str | None = None,
+    population: str | None = None,
     shown: str | None = None,
     key: str = "",
     options: Options = DEFAULTS,
@@ -203,7 +203,7 @@ def translate(
     Args:
         source: URDF or MJCF file; its name decides nothing.
         name: name of the spec.
-        people: "humanoid" or "quadruped"; default by its limbs.
+        population: "humanoid" or "quadruped"; default by its limbs.
         shown: the file's name in messages; default its path.
         key: key of the robot in the survey, whose rules for its joints then hold; "" for none.
         options: torques, speeds and other decisions that overrule the import's.
@@ -215,22 +215,22 @@ def translate(
     path = source.path
     meshes = Meshes(path.parent)
     description = weighed(describe(path, shown, source.text), meshes)
-    doubts = limits.check(description)
+    doubts = plausibility.check(description)
     description, axis = upright(description)
     if axis:
         cause = f"its {axis}: it is turned so that z does and x points forward"
         remedy = "poses of its base in its maker's software differ by that turn"
         doubts.append(Problem(cause, Location(description.file), remedy))
-    limbs = find_limbs(description, people)
-    people = limbs.population
+    limbs = find_limbs(description, population)
+    population = limbs.population
     opened = open_loops(description, limbs.ends)
     description = opened.description
-    reduced = reduce(description, key, people, options.torque, opened.linkage)
-    limits.check_depth(reduced.root)
+    reduced = reduce(description, key, population, options.torque, opened.linkage)
+    plausibility.check_depth(reduced.root)
     kept = {body.joint.name for body in reduced.root.all() if body.joint}
     reduced.notes += [*opened.notes(kept), *doubts]
     if not limbs.legs:
-        remedy = "masses are those of arms of humanoids; --population names another population"
+        remedy = "masses are those of arms of humanoids; `population` names another population"
         reduced.notes.append(Problem(NO_LEGS, Location(description.file), remedy))
     analyse(reduced, key, limbs)
     require_hinge(description, reduced.root)
@@ -238,23 +238,23 @@ def translate(
     shapes = Shapes(reduced, meshes)
     unique = names.Unique()
     bodies = reduced.root.all()[1:]
-    driven = drives(reduced, people, options, shapes)
+    driven = drives(reduced, population, options, shapes)
     classes = motors(bodies, driven, unique)
     _note_speeds(classes, reduced)
-    knees = knee_drives(reduced, shapes, driven, people, options, opened.carried)
+    knees = knee_drives(reduced, shapes, driven, population, options, opened.carried)
     parameters = Parameters(unique, digits=reduced.digits)
-    apart = trunk.fixed_head(reduced) if people == "humanoid" else []
+    apart = trunk.fixed_head(reduced) if population == "humanoid" else []
     carried = parts.carried(reduced, apart, shapes)
     without = [*apart, *(name for part in carried for name in part)]
     volumes = Volumes(reduced, shapes, driven)
-    middle = trunk.trunk(reduced, without, shapes, parameters, people)
+    middle = trunk.trunk(reduced, without, shapes, parameters, population)
     head = trunk.head(reduced, apart, shapes, parameters) if apart else None
     tree = Writer(
-        reduced, shapes, people, knees, classes, parameters, volumes, opened.cranks
+        reduced, shapes, population, knees, classes, parameters, volumes, opened.cranks
     ).write()
     if head is not None:
         tree.children.append(head)
-    tree.children += parts.boxes(carried, shapes, parameters, people)
+    tree.children += parts.boxes(carried, shapes, parameters, population)
     _count(reduced, meshes)
     where = Location(description.file)
     reduced.notes += [
@@ -265,10 +265,10 @@ def translate(
     doc = f"{description.name or path.stem}, imported from {path.name}."
     name = f"{name}_robot" if name in shipped() else name
     texts = {
-        "parameters.yaml": write.parameters_text(name, doc[:390], people, parameters, classes),
+        "parameters.yaml": write.parameters_text(name, doc[:390], population, parameters, classes),
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
         "root.yaml": write.root_text(
-            middle, volumes.trunk_density(middle.slices, people, limbs.legs)
+            middle, volumes.trunk_density(middle.slices, population, limbs.legs)
         ),
     }
     return Files(
@@ -382,7 +382,7 @@ def _note_speeds(classes: list[Motor], reduced: Reduced) -> None:
         joints = [
             name for motor in classes if motor.speed_from == "assumed" for name in motor.joints
         ]
-        remedy = f"state them, {example('--speed', 12, reduced, joints)}: reduction and armature "
+        remedy = f"state them, {example('`speed`', 12, reduced, joints)}: reduction and armature "
         remedy += "follow"
         reduced.notes.append(Problem(cause, Location(reduced.description.file), remedy))
 

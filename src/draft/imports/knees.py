@@ -42,7 +42,7 @@ def knee_drives(
     reduced: Reduced,
     shapes: Shapes,
     drives: Mapping[str, Drive],
-    people: str,
+    population: str,
     options: Options,
     carried: Mapping[str, Sequence[str]] | None = None,
 ) -> Knees:
@@ -52,7 +52,7 @@ def knee_drives(
         reduced: the robot.
         shapes: its shapes.
         drives: torque and speed of every driven hinge.
-        people: "humanoid" or "quadruped".
+        population: "humanoid" or "quadruped".
         options: what a person decides.
         carried: drives on linkages, by the joints that they move.
     """
@@ -61,8 +61,8 @@ def knee_drives(
     if not knees:
         return Knees(None, "it has no knees")
     if options.knee_drive is not None:
-        return Knees(options.knee_drive, "as stated by --knee-drive")
-    if people != "quadruped":
+        return Knees(options.knee_drive, "as stated by `knee_drive`")
+    if population != "quadruped":
         return Knees("knee", "as humanoids have them")
     for knee in knees:
         cranks = (carried or {}).get(knee.joint.name if knee.joint else "")

@@ -144,9 +144,9 @@ def find_limbs(description: Description, wanted: str | None = None) -> Limbs:
     if not legs:
         population, reason = MANIPULATOR, NO_LEGS
     if wanted is not None and wanted != population:
-        reason = f"stated by --population; by its structure: {reason}"
+        reason = f"stated by `population`; by its structure: {reason}"
     elif wanted is not None and legs:
-        reason = f"stated by --population, as by its structure: {reason}"
+        reason = f"stated by `population`, as by its structure: {reason}"
     return Limbs(wanted or population, reason, ends, skeleton.central(), len(legs), arms)
 
 

@@ -224,7 +224,7 @@ def _ratios(
     none = np.zeros((0, len(drives)))
     if not moved:
         return none, f"'{one.limb[0].name}' has a drive of its own"
-    remedy = f"--torque {moved[0].name}=VALUE drives a joint of the limb"
+    remedy = f"`torque` {moved[0].name}=VALUE drives a joint of the limb"
     if len(moved) != len(drives):
         count = f"the loop has {len(drives)} such drives and {len(moved)} joints to move"
         return none, f"{count}; {remedy}"

@@ -15,8 +15,8 @@ import numpy as np
 from draft.description.description import Description, Geometry, Inertial, Link, MeshMass, Point
 from draft.description.rigid import combined, moved
 from draft.errors import Location, Problem, quoted
-from draft.imports.limits import HEAVIEST
 from draft.imports.meshes import Meshes
+from draft.imports.plausibility import HEAVIEST
 from draft.values import Array
 
 ORIGIN: Point = (0.0, 0.0, 0.0)

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from draft.fitting.structure import roles
 from draft.imports import names
 from draft.imports.ends import Node
 from draft.imports.formatting import Parameters, vector
 from draft.imports.reduce import Reduced
 from draft.imports.shapes import Shapes
-from draft.laws.structure import population
+from draft.laws import joint_roles as roles
+from draft.laws import structure
 from draft.values import Array
 
 # Words of the links of bolted parts that are no part of a trunk.
@@ -67,7 +67,7 @@ def carried(reduced: Reduced, without: Sequence[str], shapes: Shapes) -> list[li
 
 
 def boxes(
-    carried: Sequence[Sequence[str]], shapes: Shapes, parameters: Parameters, people: str
+    carried: Sequence[Sequence[str]], shapes: Shapes, parameters: Parameters, population: str
 ) -> list[Node]:
     """Boxes of the parts, as dense as the trunks of the population."""
     found: list[Node] = []
@@ -82,7 +82,7 @@ def boxes(
             parameters.add(f"{name}_{word}", float(edge), f"{word.capitalize()} of '{name}'.", 4)
             for word, edge in words
         ]
-        density = population(people).trunk_density
+        density = structure.population(population).trunk_density
         doc = f"Mass of '{name}' over its volume: that of surveyed trunks."
         dense = parameters.add(f"{name}_density", density, doc, 1, "kg/m3")
         at = vector((box[0] + box[1]) / 2, 4)

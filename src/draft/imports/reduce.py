@@ -18,8 +18,8 @@ import numpy as np
 from draft.description.description import Description, Joint, displaced
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Problem
-from draft.fitting.structure import roles
 from draft.imports.stated import Stated
+from draft.laws import joint_roles as roles
 from draft.values import Array
 
 # Position [m] and rotation of a frame.
@@ -155,7 +155,7 @@ def require_hinge(description: Description, root: Body) -> None:
             cause = "it has no hinge that is driven"
             listed = ", ".join(one.name for one in hinges[:LISTED])
             listed += ", ..." if len(hinges) > LISTED else ""
-            remedy = f"state the torque of its hinges, --torque NAME=VALUE; hinges: {listed}"
+            remedy = f"state the torque of its hinges, `torque` NAME=VALUE; hinges: {listed}"
         else:
             cause = "it has no hinges: Draft makes robots of links that hinges with drives move"
             remedy = "import a file with limbs on hinges"
@@ -202,7 +202,7 @@ def _held(
                 effort = "no effort" if joint.effort is None else f"an effort of {joint.effort:g}"
                 cause = f"joint '{joint.name}' declares {effort}: it is held"
                 allowed = "usable: above 0" if slides else f"usable: {WEAKEST} N m and more, or "
-                allowed += "" if slides else f"state it, --torque {joint.name}=VALUE"
+                allowed += "" if slides else f"state it, `torque` {joint.name}=VALUE"
                 notes.append(Problem(cause, joint.where, allowed))
     return held
 

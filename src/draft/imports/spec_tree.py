@@ -25,7 +25,7 @@ from draft.imports.shapes import Shapes
 from draft.imports.symmetry import Copy, families, groups
 from draft.imports.trunk import trunk_name
 from draft.imports.volumes import Volumes
-from draft.laws.structure import population
+from draft.laws import structure
 from draft.values import Array
 
 CHAINS = {"hip": "leg", "shoulder": "arm", "waist": "waist", "neck": "neck", "knee": "leg"}
@@ -57,7 +57,7 @@ class Writer:
         self,
         reduced: Reduced,
         shapes: Shapes,
-        people: str,
+        population: str,
         knees: Knees,
         motors: Sequence[Motor],
         parameters: Parameters,
@@ -65,10 +65,10 @@ class Writer:
         cranks: Mapping[str, str] | None = None,
     ) -> None:
         self.reduced, self.shapes, self.parameters = reduced, shapes, parameters
-        self.people, self.knees, self.cranks = people, knees, cranks or {}
+        self.population, self.knees, self.cranks = population, knees, cranks or {}
         self.volumes = volumes
         self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
-        self.known = set(population(people).segments) - {OTHER}
+        self.known = set(structure.population(population).segments) - {OTHER}
         self.links = names.Unique([trunk_name(reduced)])
         self.joint_names = names.Unique()
         self.chain_names = names.Unique()
@@ -106,7 +106,7 @@ class Writer:
         records: list[Record] = []
         for group in family:
             own, prefixes = prefixes[: len(group)], prefixes[len(group) :]
-            side = side_of(group, family, self.people == "quadruped")
+            side = side_of(group, family, self.population == "quadruped")
             with self.parameters.chain(side, records) as record:
                 found += self.group(group, origin, (own, links, joints), family, side)
             records.append(record)
@@ -115,7 +115,7 @@ class Writer:
 
     def word(self, first: Body) -> str:
         """Name of the chain that a body begins, without its side."""
-        if self.people == "quadruped":
+        if self.population == "quadruped":
             return {"sensor": "limb", "arm": "arm", "spine": "spine"}.get(first.role, "leg")
         return CHAINS.get(first.role, "limb")
 
@@ -186,7 +186,7 @@ class Writer:
             prefixes, rests = cut
             return prefixes, rests[: len(links[0])], rests[len(links[0]) :]
         by_joint = names.factor(joints)
-        four = self.people == "quadruped"
+        four = self.population == "quadruped"
         bodies = names.shared(links)
         if by_joint is not None:
             return by_joint[0], bodies, by_joint[1]
@@ -252,7 +252,9 @@ class Writer:
             return
         lengths = [str(member["length"]) for member in members]
         long = sum(self.parameters.value(length) for length in lengths)
-        if mass >= float(population(self.people).segments[str(members[0]["segment"])](long)):
+        if mass >= float(
+            structure.population(self.population).segments[str(members[0]["segment"])](long)
+        ):
             return
         doc = f"Structure of '{name}' per metre, by its visible volume: it is slim."
         word = names.valid(name.removesuffix("_link"))
@@ -383,7 +385,7 @@ class Writer:
             return ends.wheel(body, self.site(), self.shapes, self.parameters)
         if body.role == CASTER:
             return ends.wheel(body, None, self.shapes, self.parameters)
-        if body.role == "ankle" and body.kind in self.known and self.people == "humanoid":
+        if body.role == "ankle" and body.kind in self.known and self.population == "humanoid":
             return ends.plate_foot(body, self.site(), self.shapes, self.parameters)
         if body.role in ("knee", "hip", "ankle") and body.kind in self.known:
             return ends.sphere_foot(body, body.kind, self.site(), self.shapes, self.parameters)

@@ -6,8 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from draft.fitting.structure.attribution import usable
-from draft.fitting.structure.survey_rows import read
+from draft.laws.survey import read, usable
 from draft.values import Array
 
 # Speeds that a hinge can have [rad/s].
@@ -15,20 +14,20 @@ SLOWEST, FASTEST = 0.01, 200.0
 NEIGHBOURS = 15
 
 
-def surveyed_speed(torque: float, people: str) -> float:
+def surveyed_speed(torque: float, population: str) -> float:
     """Median speed of the surveyed joints of nearest torque [rad/s]."""
-    efforts, speeds = _surveyed(people)
+    efforts, speeds = _surveyed(population)
     near = np.argsort(np.abs(np.log(efforts / torque)), kind="stable")[:NEIGHBOURS]
     return float(np.median(speeds[near]))
 
 
 @lru_cache(maxsize=2)
-def _surveyed(people: str) -> tuple[Array, Array]:
+def _surveyed(population: str) -> tuple[Array, Array]:
     """Torques and speeds that the surveyed robots of a population declare, one pair per robot."""
     pairs = {
         (row.robot, effort, speed)
         for row in read()
-        if row.population == people
+        if row.population == population
         for effort, speed in zip(row.efforts, row.velocities, strict=True)
         if usable(effort) and SLOWEST <= speed <= FASTEST
     }

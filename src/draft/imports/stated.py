@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from draft.errors import DraftError, suggest
-from draft.fitting.structure import roles
+from draft.laws import joint_roles as roles
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,14 +24,14 @@ def summary(files: Files, mass: ExpectedMass) -> Lines:
         mass: what `expected_mass` says of its design.
     """
     limbs, knees = files.limbs, files.knees
-    lines = [("population", f"{limbs.population}: {limbs.reason}; --population overrules it")]
+    lines = [("population", f"{limbs.population}: {limbs.reason}; `population` overrules it")]
     lines.append(("joints", _joints(files)))
     lines.append(("left and right", _sides(files.deviations, files.mirrored)))
-    lines.append(("torques", _sources(files, "torque_from", "--torque", 17)))
-    lines.append(("speeds", _sources(files, "speed_from", "--speed", 12)))
+    lines.append(("torques", _sources(files, "torque_from", "`torque`", 17)))
+    lines.append(("speeds", _sources(files, "speed_from", "`speed`", 12)))
     if limbs.population == "quadruped" and knees.place is not None:
         text = f"driven at the {knees.place}: {knees.why}"
-        lines.append(("knees", f"{text}; --knee-drive overrules it"))
+        lines.append(("knees", f"{text}; `knee_drive` overrules it"))
     lines.append(("trunk", f"from {files.trunk}"))
     if is_slim(files.drives):
         text = "of slim links, at most what their visible volume weighs in robots of other makers"

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from draft.errors import quoted
-from draft.fitting.structure import roles
 from draft.imports import names
 from draft.imports.ends import Node, extent
 from draft.imports.formatting import Parameters, Value, direction, tidy
 from draft.imports.reduce import Reduced
 from draft.imports.shapes import Shapes, Slice, slices
+from draft.laws import joint_roles as roles
 from draft.values import Array
 
 NO_MESHES = "the trunk has no meshes to read"
@@ -85,11 +85,11 @@ class Trunk:
 
 
 def trunk(
-    reduced: Reduced, without: list[str], shapes: Shapes, parameters: Parameters, people: str
+    reduced: Reduced, without: list[str], shapes: Shapes, parameters: Parameters, population: str
 ) -> Trunk:
     """Trunk from its meshes, else from its primitives, else from the box with its inertia."""
     links = [name for name in reduced.root.links if name not in without]
-    axis = 0 if people == "quadruped" else 2
+    axis = 0 if population == "quadruped" else 2
     triangles = shapes.triangles(links)
     found = slices(triangles, axis) if len(triangles) else []
     source, fault, instead = "its meshes", "", ""

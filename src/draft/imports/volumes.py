@@ -15,8 +15,9 @@ import numpy as np
 from draft.imports.drives import Drive, leg_length
 from draft.imports.reduce import Body, Reduced
 from draft.imports.shapes import Shapes, Slice, volume
+from draft.laws import structure
 from draft.laws.actuators import laws
-from draft.laws.structure import LEGS, population
+from draft.laws.structure import LEGS
 
 # Mass over visible volume [kg/m3], drives included, by class of segment: geometric means over 29
 # robots with meshes, one median per robot (docs/twins.md). None is one of ODRI's slim robots. ln of
@@ -52,12 +53,12 @@ class Volumes:
             return None
         return max(whole - sum(map(self._carried, own)), LEAST * whole)
 
-    def trunk_density(self, sections: Sequence[Slice], people: str, legs: int) -> float | None:
+    def trunk_density(self, sections: Sequence[Slice], population: str, legs: int) -> float | None:
         """Density of the structure of a slim robot's trunk [kg/m3].
 
         Args:
             sections: those of the trunk.
-            people: "humanoid" or "quadruped".
+            population: "humanoid" or "quadruped".
             legs: number of legs.
 
         Returns:
@@ -68,9 +69,9 @@ class Volumes:
             return None
         left = TRUNK_DENSITY - self._carried(self.reduced.root) / drawn
         density = max(left, LEAST * TRUNK_DENSITY)
-        law, leg = population(people), leg_length(self.reduced)
+        law, leg = structure.population(population), leg_length(self.reduced)
         usual = law.trunk_density
-        if leg and legs == LEGS[people]:
+        if leg and legs == LEGS[population]:
             usual = float(law.calibrated(drawn, leg))
         return density if density < usual else None
 

@@ -52,7 +52,7 @@ def flow(value: Value) -> str:
 def parameters_text(
     name: str,
     doc: str,
-    people: str,
+    population: str,
     parameters: Parameters,
     motors: Sequence[Motor],
 ) -> str:
@@ -61,7 +61,7 @@ def parameters_text(
         f"# yaml-language-server: $schema={SCHEMA_FOLDER}/parameters.json",
         f"name: {name}",
         f"doc: {flow(doc)}",
-        f"population: {people}",
+        f"population: {population}",
         "",
         "# Sizes of the robot; lengths are in the directions that members have in its zero pose.",
         "parameters:",

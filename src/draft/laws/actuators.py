@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Location, Problem
+from draft.extensions import Registry
 from draft.files import Readable
 from draft.laws.law import Law
 from draft.laws.limits import limits
@@ -66,15 +67,50 @@ def radius(volume: Value, aspect_ratio: Value) -> Value:
     return power(volume / (2 * math.pi * aspect_ratio), 1 / 3)
 
 
-@lru_cache(maxsize=8)
+ACTUATOR_LAWS: Registry[Callable[[], Laws]] = Registry("set of actuator laws")
+
+
+def actuator_laws(function: Callable[[], Laws]) -> Callable[[], Laws]:
+    """Register a function as a set of actuator laws, for `trends` in parameters.yaml.
+
+    The set has the name of the function. It is that of a coefficients file, by `read_laws`, or a
+    shipped one of which some laws are replaced:
+
+        @actuator_laws
+        def light() -> Laws:
+            \"\"\"Modules of 0.8 times the mass.\"\"\"
+            trends = dict(laws("draft").trends)
+            return replace(laws("draft"), trends=trends | {"mass": trends["mass"].scaled(0.8)})
+
+    Raises:
+        DraftError: a set of this name exists already.
+    """
+    ACTUATOR_LAWS.add(function.__name__, function, function.__module__)
+    return function
+
+
 def laws(name: str = DEFAULT) -> Laws:
-    """Shipped set of laws, "draft" or "paper"."""
-    return _laws(name, _shipped()[name])
+    """Set of laws by its name: "draft", "paper" or one of an extension.
+
+    Raises:
+        DraftError: the function of an extension fails.
+    """
+    return _made(name, ACTUATOR_LAWS[name])
+
+
+@lru_cache(maxsize=8)
+def _made(name: str, function: Callable[[], Laws]) -> Laws:
+    with ACTUATOR_LAWS.calls(name, "correct it, or write another one for 'trends'"):
+        made = function()
+        needed = _shipped()[DEFAULT]["laws"].keys()
+        if not isinstance(made, Laws) or needed - made.trends.keys():
+            raise TypeError(f"it does not give Laws with the trends {', '.join(needed)}")
+        return replace(made, name=name)
 
 
 @lru_cache(maxsize=8)
 def read_laws(path: Readable) -> Laws:
-    """Read the set `draft` of a coefficients file written by `draft trends fit --out`.
+    """Read the set `draft` of a coefficients file written by `draft trends fit`.
 
     Raises:
         DraftError: it cannot be read, or is not a coefficients file.
@@ -85,13 +121,21 @@ def read_laws(path: Readable) -> Laws:
         cause = f"cannot be read: {(error.strerror or str(error)).lower()}"
     except (ValueError, KeyError, TypeError, AttributeError):
         cause = "holds no actuator trends"
-    remedy = "write one: draft trends fit --catalogue YOURS.csv --out FILE"
+    remedy = "write one with 'draft trends fit'"
     raise DraftError(Problem(cause, Location(str(path)), remedy))
 
 
 @lru_cache(maxsize=1)
 def _shipped() -> dict[str, Any]:
     return json.loads(FILE.read_text(encoding="utf-8"))
+
+
+def _of_record(name: str) -> Laws:
+    return _laws(name, _shipped()[name])
+
+
+for _name in SETS:
+    ACTUATOR_LAWS.add(_name, partial(_of_record, _name), __name__)
 
 
 def _laws(name: str, record: dict[str, Any]) -> Laws:

@@ -1,7 +1,7 @@
 """Residuals of real robots against the trends by group of links, for studies of robustness.
 
 The shipped file has every surveyed robot, predicted by trends fitted without it, and four robots
-with meshes; `python -m docs.twins ROBOTS --residuals` writes it. Its twins weigh by the published
+with meshes; `docs.twins` writes it. Its twins weigh by the published
 sum of structure, as the published designs do that studies perturb; it stays as it is, so that
 results of studies stay comparable. Method: arXiv 2609.38405, inertia mismatch.
 """

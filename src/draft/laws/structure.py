@@ -13,13 +13,14 @@ the leg length (`draft.fitting.structure.calibrated`), or `paper`, the published
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Location, Problem
+from draft.extensions import Registry
 from draft.files import Readable
 from draft.laws.law import Law
 
@@ -147,10 +148,57 @@ class Population:
 _SCORES = frozenset(HeldOut.__dataclass_fields__)
 
 
-@lru_cache(maxsize=8)
+STRUCTURE_LAWS: Registry[Callable[[str], Population]] = Registry("set of structure laws")
+
+
+def structure_laws(function: Callable[[str], Population]) -> Callable[[str], Population]:
+    """Register a function as a set of structure laws, for `structure` in parameters.yaml.
+
+    The set has the name of the function, which takes "humanoid" or "quadruped". It is that of a
+    coefficients file, by `read_population`, or a shipped one of which some laws are replaced:
+
+        @structure_laws
+        def printed(name: str) -> Population:
+            \"\"\"Links of twice the mass.\"\"\"
+            usual = population(name)
+            return replace(usual, segments={k: law.scaled(2) for k, law in usual.segments.items()})
+
+    Raises:
+        DraftError: a set of this name exists already.
+    """
+    STRUCTURE_LAWS.add(function.__name__, function, function.__module__)
+    return function
+
+
 def population(name: str, uses: str = CALIBRATED) -> Population:
-    """Shipped structure laws of "humanoid" or "quadruped", with one of the laws of the trunk."""
+    """Structure laws of a population.
+
+    Args:
+        name: "humanoid" or "quadruped".
+        uses: "calibrated" or "paper", the shipped laws with one of those of the trunk, or a set of
+            an extension.
+
+    Raises:
+        DraftError: the function of an extension fails.
+    """
+    return _made(name, uses, STRUCTURE_LAWS[uses])
+
+
+@lru_cache(maxsize=8)
+def _made(name: str, uses: str, function: Callable[[str], Population]) -> Population:
+    with STRUCTURE_LAWS.calls(uses, "correct it, or write another one for 'structure'"):
+        made = function(name)
+        if not isinstance(made, Population):
+            raise TypeError("it does not give a Population")
+        return replace(made, name=name)
+
+
+def _shipped(uses: str, name: str) -> Population:
     return _population(name, json.loads(FILE.read_text(encoding="utf-8")) | {USES: uses})
+
+
+for _uses in (CALIBRATED, PAPER):
+    STRUCTURE_LAWS.add(_uses, partial(_shipped, _uses), __name__)
 
 
 def read_population(name: str, path: Readable) -> Population:
@@ -165,7 +213,7 @@ def read_population(name: str, path: Readable) -> Population:
         cause = f"cannot be read: {(error.strerror or str(error)).lower()}"
     except (ValueError, KeyError, TypeError, AttributeError):
         cause = f"holds no structure trends of {name}s"
-    remedy = "write one: draft survey fit --rows YOURS.csv --out FILE"
+    remedy = "write one with 'draft survey fit'"
     raise DraftError(Problem(cause, Location(str(path)), remedy))
 
 

@@ -4,8 +4,8 @@ A metric is a function of a Design, for one design or N, or of a Model if it nee
 inertia. `METRICS` lists them in the order in which they are shown. `LEARNED` lists those that are
 measured with a trained policy.
 
-To add a metric, decorate a function in a new or existing module of this package; modules are found
-by inspection. Commands, conditions, goals, pages and tests read `METRICS`.
+To add a metric, decorate a function in a new or existing module of this package, which are found by
+inspection, or in an extension. Commands, conditions, goals, pages and tests read `METRICS`.
 """
 
 from __future__ import annotations

@@ -109,7 +109,7 @@ def of_policy(
     source = open_source(policy)
     if known and source.digest != known:
         cause = f"the policy of {source.name} has changed since this began"
-        remedy = "use a file: draft play RUN --onnx FILE, then --policy FILE"
+        remedy = "give a file, which 'draft play' writes of a run: `policy=FILE`"
         raise DraftError(cause, remedy)
     found, _ = learned.of_designs(
         source, design, rows, replicas=replicas, seconds=seconds, seed=seed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from draft.design import Design
 from draft.errors import DraftError, Problem
+from draft.extensions import ExtensionWarning
 from draft.metrics.registry import METRICS, Metric, find
 from draft.values import Array, Value
 
@@ -34,7 +36,8 @@ def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, V
         `draft.metrics.find(name).unit` states; NaN where the robot has no such quantity.
 
     Raises:
-        DraftError: an unknown metric, or one that needs a model.
+        DraftError: an unknown metric, one that needs a model, or one of an extension that fails; of
+            all metrics, that one is NaN, with a warning.
     """
     chosen = [m.name for m in METRICS.values() if m.needs == "design"] if names is None else names
     found: dict[str, Value] = {}
@@ -43,15 +46,37 @@ def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, V
             metric = find(name)
             if metric.needs != "design":
                 raise DraftError(needs_more(metric))
-            found[name] = _of_all(metric.function(design), design.count)
+            value = _value(metric, design, design.count, names is not None)
+            found[name] = _of_all(value, design.count)
     return found
 
 
 def needs_more(metric: Metric) -> Problem:
     """Problem of a metric that arrays of numbers do not suffice for."""
     what = "a compiled model" if metric.needs == "model" else "a policy"
-    remedy = "use 'draft sweep', which builds every design"
+    remedy = "use `draft.sweep`, which builds every design"
     return Problem(f"'{metric.name}' needs {what}", None, remedy)
+
+
+def _value(metric: Metric, subject: object, count: int | None, named: bool) -> Value:
+    """Value of a metric; of one of an extension that fails NaN, unless it was named."""
+    if not METRICS.origin(metric.name):
+        return metric.function(subject)
+    try:
+        with METRICS.calls(metric.name, "correct it, or name the other metrics"):
+            given = metric.function(subject)
+            if given is None:
+                raise TypeError("it gives None, not a number")
+            value = np.asarray(given, np.float64)
+            if value.shape not in ((), (count,)):
+                shapes = "one number" if count is None else f"one number or shape ({count},)"
+                raise ValueError(f"it gives an array of shape {value.shape}, not {shapes}")
+    except DraftError as error:
+        if named:
+            raise
+        warnings.warn(error.problems[0].cause, ExtensionWarning, stacklevel=3)
+        return np.nan
+    return value if value.shape else float(value)
 
 
 def _of_all(value: Value, count: int | None) -> Value:
@@ -76,7 +101,8 @@ def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, floa
         A float per metric, in the unit that `draft.metrics.find(name).unit` states.
 
     Raises:
-        DraftError: an unknown metric, or one that needs a policy.
+        DraftError: an unknown metric, one that needs a policy, or one of an extension that fails;
+            of all metrics, that one is NaN, with a warning.
     """
     chosen = list(METRICS) if names is None else names
     found: dict[str, float] = {}
@@ -86,7 +112,7 @@ def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, floa
             if metric.needs == "policy":
                 raise DraftError(f"'{name}' needs a policy", "use draft.metrics.of_policy")
             subject = model if metric.needs == "model" else model.design
-            found[name] = float(metric.function(subject))
+            found[name] = float(_value(metric, subject, None, names is not None))
     return found
 
 
@@ -102,6 +128,7 @@ def of_batch(batch: ModelBatch, names: Iterable[str]) -> dict[str, Array]:
 
     Raises:
         numpy.linalg.LinAlgError: a model has a singular M(q).
+        DraftError: a metric of an extension fails.
     """
     with np.errstate(all="ignore"):
-        return {name: np.asarray(find(name).function(batch)) for name in names}
+        return {name: np.asarray(_value(find(name), batch, len(batch), True)) for name in names}

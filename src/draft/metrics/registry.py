@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
 from draft.errors import DraftError, Problem, suggest
+from draft.extensions import Registry
 
 Better = Literal["less", "more", ""]
 Needs = Literal["design", "model", "policy"]
@@ -44,7 +45,7 @@ class Metric:
     batch: bool = False
 
 
-METRICS: dict[str, Metric] = {}
+METRICS: Registry[Metric] = Registry("metric")
 # Those that need a policy, see `draft.metrics.learned`.
 LEARNED: dict[str, Metric] = {}
 # Names that metrics had before, and what to use instead.
@@ -81,19 +82,15 @@ def metric(
         batch: whether a function of a Model also takes a ModelBatch.
 
     Raises:
-        ValueError: a metric of this name exists already.
+        DraftError: a metric of this name exists already.
     """
 
     def register(function: F) -> F:
         name = function.__name__
-        if name in METRICS:
-            first = METRICS[name].function.__module__
-            raise ValueError(f"a metric '{name}' exists already in {first}: rename one")
         line = (inspect.getdoc(function) or "").partition("\n")[0]
         sentence = line.removesuffix(f" [{unit}].").removesuffix(".") + "."
-        METRICS[name] = Metric(
-            name, unit, sentence, formula, source, better, needs, function, batch
-        )
+        made = Metric(name, unit, sentence, formula, source, better, needs, function, batch)
+        METRICS.add(name, made, function.__module__)
         return function
 
     return register

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from draft.design import Design
-from draft.model.folder import FORMATS
+from draft.model.exporters import FORMATS
 from draft.model.model import Model
 
 
@@ -24,7 +24,7 @@ def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = 
         folder: folder to write, atomically; files that Draft wrote there before are replaced.
         formats: "urdf" (robot.urdf, meshes/trunk.stl and actuators.json with what URDF cannot
             hold: armature [kg m2], gains [N m/rad, N m s/rad]), "glb" (robot.glb, lengths in m)
-            and "mjcf" (robot.xml, scene.xml).
+            and "mjcf" (robot.xml, scene.xml), and those of extensions.
 
     Returns:
         The folder.
@@ -33,7 +33,7 @@ def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = 
         RefusedError: the design filter found errors.
         ModelError: MuJoCo does not accept the model.
         DraftError: the design is N designs, a format is unknown, the folder holds files that Draft
-            did not write, or cannot be written.
+            did not write, or cannot be written, or an exporter of an extension fails.
     """
     model = design.build() if isinstance(design, Design) else design
     return model.save(folder, formats)

@@ -15,33 +15,19 @@ import yaml
 from numpy.typing import NDArray
 
 from draft.design.report import design_file, report
-from draft.errors import DraftError, suggest
+from draft.errors import DraftError
 from draft.extras import own_version
 from draft.files import cannot_write, new_folder
+from draft.model.exporters import check_formats, contents, known_files
+from draft.values import plain, plain_value
 
 if TYPE_CHECKING:
     from draft.design import Design
     from draft.model.model import Model
 
-FORMATS = ("urdf", "glb", "mjcf")
-# Files that Draft writes into such a folder; a folder with any other file is not replaced.
-KNOWN = frozenset(
-    (
-        "robot.xml",
-        "scene.xml",
-        "design.yaml",
-        "report.json",
-        "robot.urdf",
-        "actuators.json",
-        "meshes",
-        "meshes/trunk.stl",
-        "robot.glb",
-        "report.html",
-    )
-)
 # The dumper of libyaml writes the same text five times as fast; some builds of PyYAML lack it.
 _Dumper: type[yaml.SafeDumper] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-_REMEDY = "choose another --out"
+_REMEDY = "choose another `out`"
 
 
 def save(
@@ -55,22 +41,19 @@ def save(
         model: the model.
         folder: folder to write. Everything that Draft wrote there before is removed, so that all
             files are of one design.
-        formats: of FORMATS: "mjcf" is robot.xml and scene.xml; "urdf" is robot.urdf,
+        formats: names of `EXPORTERS`: "mjcf" is robot.xml and scene.xml; "urdf" is robot.urdf,
             meshes/trunk.stl and actuators.json; "glb" is robot.glb.
-        more: text of further files by name, all of them in KNOWN.
+        more: text of further files by name, all of them known.
 
     Returns:
         The folder.
 
     Raises:
-        DraftError: a format is unknown, the folder holds files that Draft did not write, or it
-            cannot be written.
+        DraftError: a format is unknown, the folder holds files that Draft did not write, it
+            cannot be written, or an exporter of an extension fails.
         ModelError: MuJoCo does not accept the scene.
     """
-    unknown = [name for name in formats if name not in FORMATS]
-    if unknown:
-        cause = f"unknown format '{unknown[0]}'"
-        raise DraftError(cause, suggest(unknown[0], FORMATS, "formats"))
+    check_formats(formats)
     try:
         _check_target(folder)
     except OSError as error:
@@ -79,7 +62,7 @@ def save(
     with new_folder(folder, _REMEDY) as temporary:
         for name, content in files.items():
             path = temporary / name
-            path.parent.mkdir(exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content.encode() if isinstance(content, str) else content)
     return folder
 
@@ -102,7 +85,7 @@ def design_texts(design: Design, rows: NDArray[np.intp]) -> list[str]:
         if isinstance(value, np.ndarray) and value.ndim:
             columns.append(value[rows].tolist())
             return f"{_MARK}{len(columns) - 1}{_MARK}"
-        return _plain(value)
+        return plain_value(value)
 
     parts = _dumped(marked(design_file(design))).split(_MARK)
     words = [[_float_text(x) for x in columns[int(number)]] for number in parts[1::2]]
@@ -126,25 +109,8 @@ def _float_text(value: float) -> str:
 
 
 def _dumped(data: Any) -> str:
-    heading = (
-        "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
-    )
+    heading = "# Written by Draft. 'draft build SPEC:design.yaml' gives this model again.\n"
     return heading + yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
-
-
-def plain(record: Mapping[str, object]) -> dict[str, Any]:
-    """Convert a record to plain data for JSON and YAML: dicts, lists, strings and numbers."""
-    return {str(key): _plain(item) for key, item in record.items()}
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, dict):
-        return plain(value)
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return value.tolist()
-    return value
 
 
 def _check_target(folder: Path) -> None:
@@ -153,7 +119,7 @@ def _check_target(folder: Path) -> None:
         raise DraftError(f"'{folder}' exists and is not a folder", _REMEDY)
     if folder.is_dir() and any(folder.iterdir()):
         found = (path.relative_to(folder).as_posix() for path in folder.rglob("*"))
-        others = sorted(name for name in found if name not in KNOWN)
+        others = sorted({*found} - known_files())
         if others or not (folder / "report.json").is_file():
             held = f"it holds {', '.join(others[:4])}" if others else "it has no report.json"
             cause = f"'{folder}' is not a folder of a Draft model ({held}); it is kept"
@@ -165,23 +131,7 @@ def _files(model: Model, formats: Sequence[str]) -> dict[str, str | bytes]:
     record = report(model.design) | {
         "versions": {"draft": own_version(), "mujoco": mujoco.__version__}
     }
-    files: dict[str, str | bytes] = {}
-    if "mjcf" in formats:
-        model.scene()
-        files |= {"robot.xml": model.xml, "scene.xml": model.scene_xml}
-    if "urdf" in formats:
-        from draft.model import urdf
-
-        table = json.dumps(plain(urdf.actuators(model.design)), indent=2) + "\n"
-        files |= {
-            "robot.urdf": urdf.robot_urdf(model),
-            urdf.TRUNK: urdf.trunk_stl(model.design.trunk.loft),
-            "actuators.json": table,
-        }
-    if "glb" in formats:
-        from draft.model.glb import robot_glb
-
-        files["robot.glb"] = robot_glb(model)
+    files = {path: text for name in formats for path, text in contents(model, name).items()}
     return files | {
         "design.yaml": design_text(model.design),
         "report.json": json.dumps(plain(record), indent=2) + "\n",

@@ -22,24 +22,12 @@ from draft.design.design import Body, Design
 from draft.errors import DraftError
 from draft.geometry import Vector
 from draft.model.xml import Element
-from draft.spec.primitives import LINKS
-from draft.spec.primitives.base import Color, Geom
+from draft.spec.primitives.base import COLORS, Color, Geom
 from draft.values import Array, Value, both, either, is_array, scalar, sqrt, where
 
 if TYPE_CHECKING:
     from draft.spec import Spec
 
-# Colours of the kinds of geom that any robot may have.
-_COMMON: dict[str, Color] = {
-    "trunk": (0.21, 0.38, 0.56, 1),
-    "structure": (0.86, 0.87, 0.88, 1),
-    "actuator": (0.24, 0.25, 0.28, 1),
-    "foot": (0.16, 0.16, 0.17, 1),
-    "drawn": (0.95, 0.55, 0.20, 1),
-}
-COLORS = _COMMON | {
-    kind: color for link in LINKS if link.end is not None for kind, color in link.end.colors.items()
-}
 # Coordinates of the trunk's mesh below it are zero [m].
 _SMALLEST_VERTEX = 1e-30
 # Largest gap between the trunk and a part on it that needs no bracket, and gap from which on MuJoCo
@@ -52,7 +40,7 @@ FORMS = {"trunk": "mesh", "structure": "cylinder", "actuator": "cylinder", "draw
 def colors(design: Design) -> dict[str, Color]:
     """Colours by kind of geom of a robot; the kinds of all robots come first."""
     ends = [body.link.end for body in design.bodies if body.link.end is not None]
-    return _COMMON | {kind: color for end in ends for kind, color in end.colors.items()}
+    return COLORS | {kind: color for end in ends for kind, color in end.colors.items()}
 
 
 def robot_xml(design: Design) -> str:

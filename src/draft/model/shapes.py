@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from draft.design.design import Design
-from draft.model.mjcf import COLORS
+from draft.spec.primitives import colors
 from draft.values import Array
 
 Form = Literal["mesh", "box", "cylinder", "sphere"]
@@ -29,7 +29,7 @@ class Shape:
     Attributes:
         name: name of its geom.
         body: index of its body in the compiled model.
-        kind: kind of part, a key of `draft.model.mjcf.COLORS`.
+        kind: kind of part, a key of `draft.spec.primitives.colors()`.
         form: "mesh" is the trunk, whose vertices are in the frame of the body.
         size: half sizes [m] in MuJoCo's convention, shape (3,); meaningless for a mesh.
         position: position of its frame in the frame of the body [m], shape (3,).
@@ -52,7 +52,7 @@ def shapes(model: mujoco.MjModel, design: Design) -> list[Shape]:
     visible = []
     trunk = design.bodies[0].name + design.trunk.suffix
     # A compiled model has no geom classes, but colours, in single precision, identify them.
-    colors = {tuple(np.array(color, np.float32)): kind for kind, color in COLORS.items()}
+    kinds = {tuple(np.array(color, np.float32)): kind for kind, color in colors().items()}
     for i in range(model.ngeom):
         form = _FORMS[int(model.geom_type[i])]
         name = model.geom(i).name
@@ -62,7 +62,7 @@ def shapes(model: mujoco.MjModel, design: Design) -> list[Shape]:
             Shape(
                 name,
                 int(model.geom_bodyid[i]),
-                colors[tuple(model.geom_rgba[i])],
+                kinds[tuple(model.geom_rgba[i])],
                 form,
                 model.geom_size[i].copy(),
                 np.zeros(3) if moved else model.geom_pos[i].copy(),

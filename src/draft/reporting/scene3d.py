@@ -11,12 +11,12 @@ import mujoco
 import numpy as np
 
 from draft.model import Model
-from draft.model.mjcf import COLORS
 from draft.model.scene import home_position
 from draft.model.shapes import shapes
 from draft.model.solids import Triangles, triangles
 from draft.reporting.motion import SEGMENTS, Motion, belt, packed
 from draft.reporting.subjects import Subject
+from draft.spec.primitives import colors
 from draft.values import Array
 
 YAW = 0.75  # of every robot, away from the camera [rad]
@@ -106,7 +106,7 @@ def home(model: Model) -> mujoco.MjData:
 
 def _mesh(subject: Subject, kind: str, part: Triangles, shift: Array) -> dict[str, Any]:
     """Mesh of all parts of one kind; the trunk has the colour of the design."""
-    color = [255 * c for c in COLORS[kind][:3]]
+    color = [255 * c for c in colors()[kind][:3]]
     if kind == "trunk":
         color = [int(subject.color[k : k + 2], 16) for k in (1, 3, 5)]
     ends = [[min(factor * c, 255.0) for c in color] for factor in (_DARK, _BRIGHT)]

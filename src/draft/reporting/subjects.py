@@ -12,10 +12,9 @@ from draft.design.report import report
 from draft.errors import DraftError, ModelError
 from draft.metrics import of_design, of_model
 from draft.model import Model
-from draft.model.folder import plain
 from draft.model.model import preview
 from draft.plotting import COLORS
-from draft.values import scalar
+from draft.values import plain, scalar
 
 if TYPE_CHECKING:
     from draft.learn.policy.gait import Gait
@@ -62,7 +61,7 @@ def subjects(
     """
     if not 1 <= len(designs) <= MOST:
         cause = f"a report is about 1 to {MOST} designs, not {len(designs)}"
-        raise DraftError(cause, "use 'draft sweep' for many")
+        raise DraftError(cause, "use `draft.sweep` for many")
     if any(design.count is not None for design in designs):
         raise DraftError("a report is about single designs", "select one: design[0]")
     found = []

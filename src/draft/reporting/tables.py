@@ -254,7 +254,7 @@ def laws(subjects: Sequence[Subject]) -> Html:
         for quantity, trend in found.trends.items():
             if trend.terms:
                 label = quantity.replace("_", " ")
-                error = f"{trend.held_out['vendor']:.2f} x"
+                error = f"{trend.held_out['vendor']:.2f} x" if trend.held_out else ""
                 rows.append((label, name, trend.formula, str(trend.n), error, trend.source))
     head = ["quantity", "laws", "law", "modules", "error on held-out vendors", "source"]
     return table(head, rows, "words")

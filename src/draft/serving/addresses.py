@@ -53,10 +53,10 @@ def not_served(host: str, port: int, reason: str, number: int | None) -> DraftEr
     if number == errno.EADDRINUSE:
         cause = f"cannot serve on {host} port {port}: another page or program uses it"
         another = port + 1 if port < MAX_PORT else port - 1
-        remedy = f"end that one, or pass --port {another}, or --port 0 for any free port"
+        remedy = f"end that one, or pass `port={another}`, or `port=0` for any free port"
         return DraftError(cause, remedy)
     cause = f"cannot serve on {host} port {port}: {reason}"
-    return DraftError(cause, "choose another --port or --host")
+    return DraftError(cause, "choose another `port` or `host`")
 
 
 def address(host: str, port: int, token: str | None = None) -> str:

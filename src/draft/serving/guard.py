@@ -88,8 +88,8 @@ def check_address(host: str, token: str | None) -> None:
         remedy = f"give at least {MIN_TOKEN} letters, digits, '-' and '_'"
         raise DraftError(cause, remedy)
     if not is_loopback(host) and token is None:
-        cause = f"'{host}' can be reached from other machines, and there is no --token"
-        raise DraftError(cause, f"give --token with {MIN_TOKEN} characters")
+        cause = f"'{host}' can be reached from other machines, and there is no `token`"
+        raise DraftError(cause, f"give `token` with {MIN_TOKEN} characters")
 
 
 def read_request(path: str, headers: Iterable[tuple[str, str]]) -> Request | None:

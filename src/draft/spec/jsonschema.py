@@ -21,8 +21,9 @@ FILES: dict[str, type[Model]] = {
 
 def schema_text(name: str) -> str:
     """JSON Schema of one file: "parameters", "tree", "root" or "design"."""
-    schema = FILES[name].model_json_schema()
-    document = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    model = schema.tree_file() if name == "tree" else FILES[name]
+    document = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    document |= model.model_json_schema()
     return json.dumps(document, indent=1) + "\n"
 
 

@@ -6,14 +6,15 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 import pydantic
 
-from draft.errors import Location, Problem, SpecError, suggest
+from draft.errors import DraftError, Location, Problem, SpecError, suggest
+from draft.extensions import Registry
 from draft.files import Content, Readable
 from draft.spec import schema
 from draft.spec.check import check_spec, design_problems
@@ -36,14 +37,39 @@ _DESIGN = re.compile(r"designs/[^/]+\.yaml")
 _File = TypeVar("_File", bound=Model)
 
 
-@lru_cache(maxsize=1)
+# Folders of the robots that are known by name.
+FOLDERS: Registry[Path] = Registry("robot")
+
+
+def robots(folder: str | Path, origin: str) -> None:
+    """Let robots be known by name, as the shipped ones are.
+
+        robots(Path(__file__).with_name("robots"), __name__)
+
+    Args:
+        folder: folder of the robots; the folder of each has its name.
+        origin: name of the module that calls this.
+
+    Raises:
+        DraftError: it holds no robot, or a robot of this name exists already.
+    """
+    found = sorted(path.parent.resolve() for path in Path(folder).glob("*/parameters.yaml"))
+    if not found:
+        raise DraftError(f"there is no robot in '{folder}', of {origin}", MISSING)
+    for path in found:
+        FOLDERS.add(path.name, path, origin)
+
+
+robots(ROBOTS, "draft.robots")
+
+
 def shipped() -> tuple[str, ...]:
-    """Names of the shipped robots.
+    """Names of the robots that Draft and its extensions ship.
 
     >>> draft.shipped()
     ('hopper', 'humanoid', 'quadruped')
     """
-    return tuple(sorted(path.parent.name for path in ROBOTS.glob("*/parameters.yaml")))
+    return tuple(sorted(FOLDERS))
 
 
 def find(robot: str | Path) -> Path:
@@ -52,8 +78,8 @@ def find(robot: str | Path) -> Path:
     Raises:
         SpecError: it is neither a shipped robot nor a folder.
     """
-    if isinstance(robot, str) and robot in shipped():
-        return ROBOTS / robot
+    if isinstance(robot, str) and robot in FOLDERS:
+        return FOLDERS[robot]
     folder = Path(robot)
     if not str(robot).strip():
         remedy = suggest("", shipped(), "shipped robots") + "; '.' is the current folder"
@@ -150,7 +176,7 @@ def _spec(
     """
     parameters_source, tree_source, root_source = map(read, FILES)
     parameters_file = validate(schema.ParametersFile, parameters_source)
-    tree_file = validate(schema.TreeFile, tree_source)
+    tree_file = validate(schema.tree_file(), tree_source)
     root_file = validate(RootFile, root_source)
     trends, structure = parameters_file.trends, parameters_file.structure
     further = [name for name in (trends, structure) if name.endswith(".json")]

@@ -10,7 +10,7 @@ from draft.errors import DraftError, SpecError, suggest
 from draft.files import new_folder
 from draft.spec.field_types import MAX_NAME, NAME_PATTERN
 from draft.spec.jsonschema import write_schemas
-from draft.spec.load import ROBOTS, load, shipped
+from draft.spec.load import FOLDERS, load, shipped
 from draft.spec.problems import NAME_RULE
 
 SCHEMA_FOLDER = ".schema"
@@ -42,7 +42,7 @@ def new_robot(folder: Path, like: str) -> Path:
 
 
 def _fill(target: Path, name: str, like: str) -> None:
-    source = ROBOTS / like
+    source = FOLDERS[like]
     write_schemas(target / SCHEMA_FOLDER)
     for path in sorted(source.rglob("*.yaml")):
         relative = path.relative_to(source)

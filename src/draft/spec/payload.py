@@ -28,7 +28,7 @@ HEAVIEST, DENSEST = 1e4, 2e4
 PLACE = ("payload.x", "payload.y", "payload.top")
 # A block has a size even if it weighs nothing [kg].
 _LEAST = 1e-6
-_WHERE = Location("--payload")
+_WHERE = Location("`payload`")
 
 _loaded: WeakKeyDictionary[Spec, Spec] = WeakKeyDictionary()
 

@@ -17,8 +17,6 @@ MAX_PROBLEMS = 12
 NAME_RULE = "a name has letters, digits and _, no digit first, and at most 64 of them"
 _KEY = "[key]"  # pydantic's last step where a mapping's key is wrong, not its value
 _MAPPING = "expected a mapping of keys and values"
-# Keys that only one type of link has, with that type.
-_OF_TYPE = {link.end.key: link.type_name() for link in LINKS if link.end is not None}
 
 
 def translate(error: pydantic.ValidationError, source: Source) -> list[Problem]:
@@ -48,8 +46,9 @@ def _problems(item: ErrorDetails, source: Source) -> Iterator[Problem]:
     if item["type"] == "unknown_keys":
         for key in context["unknown"]:
             remedy = suggest(key, context["known"], "known here")
-            if key in _OF_TYPE:
-                remedy = f"only a link of 'type: {_OF_TYPE[key]}' has it; {remedy}"
+            for type_, link in LINKS.items():
+                if link.end is not None and link.end.key == key:
+                    remedy = f"only a link of 'type: {type_}' has it; {remedy}"
             where = source.at((*path, key), key=True)
             yield Problem(f"unknown key '{key}' in {what}", where, remedy)
         return
@@ -94,8 +93,7 @@ def _cause_and_remedy(
             return context["cause"], context["remedy"]
         case "link_type":
             type_ = value["type"] if isinstance(value, dict) else value
-            types = [link.type_name() for link in LINKS]
-            remedy = suggest(str(type_), types, "choose from")
+            remedy = suggest(str(type_), LINKS, "choose from")
             return f"unknown value {_shown(type_)}", remedy
     return f"{message}, {found}", ""
 

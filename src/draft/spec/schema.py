@@ -7,14 +7,19 @@ models for editors.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import pydantic
-from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from draft.laws import quantities
+from draft.laws.actuators import ACTUATOR_LAWS
 from draft.laws.quantities import CORNER
+from draft.laws.structure import STRUCTURE_LAWS
 from draft.spec.field_types import (
     Model,
     Name,
@@ -31,25 +36,31 @@ from draft.spec.primitives.root import Trunk
 
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 _CSV_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.csv")
-_TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
-_STRUCTURE_SET = re.compile(f"calibrated|paper|{_JSON_FILE.pattern}")
 
 
-def _trend_set(value: object) -> str:
-    if not isinstance(value, str) or not _TREND_SET.fullmatch(value):
-        raise PydanticCustomError(
-            "trend_set", "expected draft, paper or the name of a .json file in the robot's folder"
-        )
-    return value
+@dataclass(frozen=True)
+class _NamedLaws:
+    """Type of the name of a set of laws, of a registry or a file of the robot."""
 
+    registry: Mapping[str, object]
+    kind: str
 
-def _structure_set(value: object) -> str:
-    if not isinstance(value, str) or not _STRUCTURE_SET.fullmatch(value):
-        raise PydanticCustomError(
-            "structure_set",
-            "expected calibrated, paper or the name of a .json file in the robot's folder",
-        )
-    return value
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: pydantic.GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self._read)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: pydantic.GetJsonSchemaHandler
+    ) -> dict[str, str]:
+        return {"type": "string", "pattern": f"^({'|'.join(self.registry)}|{_JSON_FILE.pattern})$"}
+
+    def _read(self, value: object) -> str:
+        if isinstance(value, str) and (value in self.registry or _JSON_FILE.fullmatch(value)):
+            return value
+        names = ", ".join(self.registry)
+        message = f"expected {names} or the name of a .json file in the robot's folder"
+        raise PydanticCustomError(self.kind, message)  # type: ignore[arg-type]
 
 
 def _catalogue_file(value: object) -> str:
@@ -60,16 +71,8 @@ def _catalogue_file(value: object) -> str:
     return value
 
 
-TrendSet = Annotated[
-    str,
-    BeforeValidator(_trend_set),
-    WithJsonSchema({"type": "string", "pattern": f"^({_TREND_SET.pattern})$"}),
-]
-StructureSet = Annotated[
-    str,
-    BeforeValidator(_structure_set),
-    WithJsonSchema({"type": "string", "pattern": f"^({_STRUCTURE_SET.pattern})$"}),
-]
+TrendSet = Annotated[str, _NamedLaws(ACTUATOR_LAWS, "trend_set")]
+StructureSet = Annotated[str, _NamedLaws(STRUCTURE_LAWS, "structure_set")]
 CatalogueFile = Annotated[
     str,
     BeforeValidator(_catalogue_file),
@@ -178,15 +181,15 @@ class ParametersFile(Model):
     population: Population
     """Surveyed population whose structure trends apply."""
     trends: TrendSet = "draft"
-    """Actuator laws: `draft`, Draft's own; `paper`, the published forms; or a file of `draft trends
-    fit --out` in the folder of the robot."""
+    """Actuator laws: `draft`, Draft's own; `paper`, the published forms; or a file that
+    `draft trends fit` wrote, in the folder of the robot."""
     catalogue: CatalogueFile | None = None
     """Modules of your own: a table with the columns of the shipped one, in the folder of the robot.
     `like` and the design filter know them besides the shipped ones."""
     structure: StructureSet = "calibrated"
     """Structure trends of the shipped survey: `calibrated`, with the density of the trunk by volume
     and leg length, for robots on two or four legs; `paper`, with the published density; or a file
-    of `draft survey fit --out` in the folder of the robot."""
+    that `draft survey fit` wrote, in the folder of the robot."""
     parameters: dict[Name, Parameter]
     """Parameters by name."""
     actuators: dict[Name, ActuatorClass]
@@ -241,26 +244,34 @@ def _node_kind(value: object) -> str:
     return f"({kind})"
 
 
+class _AnyNode:
+    """Core schema of a link or a use of a chain: the links are those of the present primitives."""
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: pydantic.GetCoreSchemaHandler
+    ) -> CoreSchema:
+        *first, last = LINKS
+        message = f"expected {', '.join(first)} or {last} (or 'chain' in place of 'type')"
+        kinds = {"chain": ChainUse, **LINKS}
+        return core_schema.tagged_union_schema(
+            {f"({name})": handler.generate_schema(model) for name, model in kinds.items()},
+            _node_kind,
+            custom_error_type="link_type",
+            custom_error_message=message,
+        )
+
+
 if TYPE_CHECKING:
     Node = ChainUse | LinkBase
 else:
-    *_first, _last = (link.type_name() for link in LINKS)
-    Node = Annotated[
-        Union[
-            Annotated[ChainUse, Tag("(chain)")],
-            *(Annotated[link, Tag(f"({link.type_name()})")] for link in LINKS),
-        ],
-        Discriminator(
-            _node_kind,
-            custom_error_type="link_type",
-            custom_error_message=f"expected {', '.join(_first)} or {_last} "
-            "(or 'chain' in place of 'type')",
-        ),
-    ]
+    Node = Annotated[Any, _AnyNode()]
 
 
 class TreeFile(Model):
     """tree.yaml: the tree of links and joints."""
+
+    # By `tree_file`: extensions are not loaded while Draft is.
+    model_config = pydantic.ConfigDict(defer_build=True)
 
     chains: dict[Name, Annotated[list[Node], Field(min_length=1)]] = Field({})
     """Serial chains of links: each link is attached to the previous one."""
@@ -283,5 +294,14 @@ class DesignFile(Model):
     """All resulting numbers, in files that Draft writes. It is not read."""
 
 
-for _model in (*LINKS, Trunk, TreeFile):
-    _model.model_rebuild(_types_namespace={"Node": Node})
+def tree_file() -> type[TreeFile]:
+    """Model of tree.yaml, with the links of extensions."""
+    _complete(tuple(LINKS.values()))
+    return TreeFile
+
+
+@lru_cache(maxsize=1)
+def _complete(links: tuple[type[LinkBase], ...]) -> None:
+    """Build the models that have links, again where a script has added a primitive."""
+    for model in (*links, Trunk, TreeFile):
+        model.model_rebuild(force=True, _types_namespace={"Node": Node})

@@ -10,7 +10,7 @@ from draft.design.findings import grouped
 from draft.design.report import actuator_rows, mass_parts
 from draft.design.widened import band
 from draft.studio import fields, plots
-from draft.studio.limits import allowed
+from draft.studio.allowed_range import allowed
 from draft.studio.session import Session
 from draft.values import scalar
 

@@ -15,7 +15,7 @@ from draft.errors import DraftError
 from draft.files import write
 from draft.spec import Spec
 from draft.spec.field_types import MAX_NAME, NAME_PATTERN
-from draft.spec.load import ROBOTS, read_design
+from draft.spec.load import FOLDERS, read_design
 from draft.spec.problems import NAME_RULE
 from draft.spec.spec import NamedDesign
 
@@ -73,12 +73,12 @@ class Library:
     Attributes:
         spec: the robot.
         folder: folder that designs are saved in: `designs` in the robot's folder, or
-            `NAME_designs` in the working directory for a shipped robot.
+            `NAME_designs` in the working directory for a robot that is known by name.
         writes: limit of what all tabs write.
     """
 
     def __init__(self, spec: Spec, folder: Path | None = None) -> None:
-        if folder is None and (spec.folder is None or spec.folder.is_relative_to(ROBOTS)):
+        if folder is None and (spec.folder is None or spec.folder in FOLDERS.values()):
             folder = Path(f"{spec.name}_designs")
         self.spec = spec
         self.folder = folder or Path(spec.folder or "", "designs")

@@ -12,8 +12,8 @@ import viser
 from draft.learn.policy.policy import Policy
 from draft.serving.server import Server
 from draft.studio.library import Library, Setting
-from draft.studio.page import report_page
 from draft.studio.panel import Panel
+from draft.studio.report_page import report_page
 from draft.studio.session import Point, Session
 
 

@@ -74,7 +74,7 @@ def on_cpu(
             check_replicas(replicas, replicas, chosen, ["cpu"])
         if not 0 < replicas <= study.environments:
             worlds = counted(study.environments, "world")
-            cause = f"--replicas {replicas}: a training has {worlds} to share"
+            cause = f"`replicas` {replicas}: a training has {worlds} to share"
             raise DraftError(cause, f"choose 1 to {study.environments}")
     elif chosen.name == NATIVE and not study.toy and not cluster:
         processes = max(1, min(most // (workers or 1), study.environments))

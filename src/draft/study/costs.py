@@ -12,10 +12,11 @@ from draft.errors import counted
 from draft.learn.engine.machine import KINDS, NATIVE, minutes
 from draft.learn.measuring.levels import BATTERIES as GRIDS
 from draft.learn.measuring.levels import WORDS
+from draft.learn.task.stages import STAGES
 from draft.learn.training.progress import PROGRESS
 from draft.learn.training.run import Plan, Run
 from draft.study.capacity import Capacity
-from draft.study.jobs import BATTERIES, Evaluating, Job, Training
+from draft.study.jobs import Evaluating, Job, Training
 from draft.study.store import DONE, Store
 
 # Steps per second of one GPU: assumed, not measured. `--rate` overrides it.
@@ -72,7 +73,7 @@ class Rates:
     def words(self) -> str:
         """Return the source of the estimate, in words."""
         if self._rate is not None:
-            return f"an estimate, at the {self._rate:,.0f} steps/s of --rate"
+            return f"an estimate, at the {self._rate:,.0f} steps/s of `rate`"
         if self.measured:
             rates = ", ".join(f"{stage} {rate:,.0f}" for stage, rate in self.measured.items())
             return f"an estimate, at steps/s measured in this study: {rates}"
@@ -82,7 +83,7 @@ class Rates:
             rates = " and ".join(f"{rate:,.0f} on {ground}" for ground, rate in assumed.items())
             return f"an estimate, at steps/s measured on another CPU: {rates} ground; {later}"
         rates = f"{ASSUMED_RATE:,.0f} steps/s, which is an assumption"
-        return f"an estimate, at {rates}; --rate overrides it, and {later}"
+        return f"an estimate, at {rates}; `rate` overrides it, and {later}"
 
     def _alike(self, engine: str | None) -> bool:
         """Return whether the rate of a run that last used an engine holds for these jobs."""
@@ -176,7 +177,7 @@ def hours(job: Job, folder: Path, rates: Rates, anew: bool = False) -> float:
 
 
 def _levels(job: Evaluating) -> int:
-    battery = BATTERIES[job.training.plan.stage]
+    battery = STAGES[job.training.plan.stage].battery
     most = sum(len(GRIDS[name].levels) for name in WORDS[battery])
     asked = most if job.levels is None else job.levels * (2 if battery == "stairs" else 1)
     return min(most, asked)

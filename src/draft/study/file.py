@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, Tag
-from pydantic_core import PydanticCustomError
+from pydantic_core import PydanticCustomError, PydanticKnownError
 
 from draft.errors import DraftError, Location, Problem, SpecError
 from draft.learn.bodies.inertia import ErrorSource
 from draft.learn.task.config import STAGES, Config
 from draft.learn.task.recipes import RECIPES
+from draft.learn.task.stages import PUBLISHED
 from draft.spec.load import validate
 from draft.spec.reader import Path_, Source, read_file
 from draft.spec.schema import Model
@@ -50,11 +51,20 @@ def _unique(values: list[_T]) -> list[_T]:
     return values
 
 
+def _stage(value: object) -> object:
+    if value not in STAGES:
+        raise PydanticKnownError("literal_error", {"expected": ", ".join(map(repr, STAGES))})
+    return value
+
+
 def _stages(values: object) -> object:
     if isinstance(values, list) and all(value in STAGES for value in values):
         _unique(values)
-        if values[:1] != ["base"]:
-            raise PydanticCustomError("base", "'base' must come first: the others start from it")
+        for stage in values:
+            origin = STAGES[stage].origin
+            if origin not in (None, *values[: values.index(stage)]):
+                words = "'{origin}' must come first: '{stage}' starts from it"
+                raise PydanticCustomError("origin", words, {"origin": origin, "stage": stage})
         if values != [stage for stage in STAGES if stage in values]:
             order = {"order": ", ".join(STAGES)}
             raise PydanticCustomError("order", "out of order; the order is {order}", order)
@@ -71,7 +81,7 @@ Iterations = Annotated[int, _whole(1, 10**7)]
 Replicas = Annotated[int, _whole(1, 10**5)]
 Switch = Annotated[bool, BeforeValidator(_yes_no)]
 Seconds = Annotated[float, BeforeValidator(_seconds)]
-Stage = Literal["base", "velocity", "terrain", "push"]
+StageName = Annotated[str, BeforeValidator(_stage)]
 RecipeName = Literal["paper", "laptop"]
 Word = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 # Part of file names and of the names of jobs.
@@ -141,7 +151,7 @@ class ToyEvaluation(Model):
 
 
 class Toy(Model):
-    """Values that --toy replaces, so small that a laptop's processor needs only minutes."""
+    """Values of a toy of the study, so small that a laptop's processor needs only minutes."""
 
     seeds: Seeds = 1
     """Number of seeds, or a list of them."""
@@ -176,22 +186,22 @@ class StudyFile(Model):
     """Designs as 'draft train' takes them, and families."""
     seeds: Seeds = 10
     """Number of seeds, or a list of them."""
-    stages: Annotated[list[Stage], Field(min_length=1), BeforeValidator(_stages)] = Field(
-        default_factory=lambda: list(STAGES)
+    stages: Annotated[list[StageName], Field(min_length=1), BeforeValidator(_stages)] = Field(
+        default_factory=lambda: [stage.name for stage in PUBLISHED]
     )
-    """Stages that are trained; all but base start from base."""
+    """Stages that are trained, each after the one that it starts from: base, for all others."""
     recipe: RecipeName = "paper"
     """Numbers and grounds that the other keys override: as published, or for a laptop."""
     environments: Worlds | None = None
     """Number of worlds of each training; the recipe's by default."""
-    iterations: dict[Stage, Iterations] = Field(default_factory=dict)
+    iterations: dict[StageName, Iterations] = Field(default_factory=dict)
     """Iterations of each stage; the recipe's by default."""
     set: Numbers = Field(default_factory=dict)
     """Numbers of the tasks, as 'draft learn show' lists them."""
     evaluate: Evaluation = Evaluation()
     """Settings of the evaluation."""
     toy: Toy = Toy()
-    """Values that --toy replaces."""
+    """Values of a toy of the study."""
 
 
 class Study:
@@ -246,7 +256,7 @@ class Study:
 
     def iterations(self, stage: str) -> int:
         """Return the iterations of a stage."""
-        return self._iterations.get(stage) or self.config.learning.iterations(stage)
+        return self._iterations.get(stage) or self.config.iterations(stage)
 
     def place(self, *path: str | int) -> Location:
         """Return line and column of a value, by the keys and indices that lead to it."""

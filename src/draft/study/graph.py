@@ -12,9 +12,10 @@ from collections.abc import Mapping, Sequence
 
 from draft.extras import own_version
 from draft.learn.measuring.summary import ARMS, FORMAT, PROTOCOLS
+from draft.learn.task.stages import STAGES
 from draft.learn.training import run as runs
 from draft.study.file import Study
-from draft.study.jobs import BATTERIES, REPORT, Evaluating, Group, Job, Reporting, Training
+from draft.study.jobs import REPORT, Evaluating, Group, Job, Reporting, Training
 
 
 def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
@@ -25,10 +26,10 @@ def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
     jobs: dict[str, Job] = {}
     for seed in study.seeds:
         for group in groups:
-            base: Training | None = None
+            trained: dict[str, Training] = {}
             for stage in study.stages:
-                training = _training(study, group, stage, seed, base)
-                base = base or training
+                origin = trained.get(STAGES[stage].origin or "")
+                training = trained[stage] = _training(study, group, stage, seed, origin)
                 for job in (training, *_evaluations(study, training)):
                     jobs[job.name] = job
     last = tuple(name for name, job in jobs.items() if job.kind == "evaluate")
@@ -37,7 +38,9 @@ def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
     return jobs
 
 
-def _training(study: Study, group: Group, stage: str, seed: int, base: Training | None) -> Training:
+def _training(
+    study: Study, group: Group, stage: str, seed: int, origin: Training | None
+) -> Training:
     ground = study.recipe.ground(stage)
     plan = runs.Plan(
         members=group.members,
@@ -48,14 +51,14 @@ def _training(study: Study, group: Group, stage: str, seed: int, base: Training 
         ground=ground,
         see_design=group.see_design,
         # A policy that saw the ground keeps seeing it; one that did not may start to.
-        see_ground=ground == "uneven" or (base is not None and base.plan.see_ground),
+        see_ground=ground == "uneven" or (origin is not None and origin.plan.see_ground),
     )
     iterations = study.iterations(stage)
-    determinants = plan.record() | {"from": base.key if base else None, "code": _code()}
+    determinants = plan.record() | {"from": origin.key if origin else None, "code": _code()}
     return Training(
         name=f"{group.name}-{stage}-{seed}",
         key=_hash(determinants | {"iterations": iterations}),
-        needs=(base.name,) if base else (),
+        needs=(origin.name,) if origin else (),
         group=group,
         plan=plan,
         iterations=iterations,
@@ -71,7 +74,7 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
             errors = asked.errors if arm == "perturbed" else None
             determinants = {
                 "run": training.key,
-                "battery": BATTERIES[training.plan.stage],
+                "battery": STAGES[training.plan.stage].battery,
                 "arm": arm,
                 "protocol": protocol,
                 "replicas": asked.replicas,

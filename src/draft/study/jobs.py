@@ -15,11 +15,11 @@ from draft.learn.measuring import levels as battery
 from draft.learn.measuring import results
 from draft.learn.measuring.summary import Arm, Protocol
 from draft.learn.measuring.summary import Request as Asked
+from draft.learn.task.stages import STAGES
 from draft.learn.training import run as runs
 from draft.learn.training.session import SCRATCH, begin
 from draft.study.requests import EvaluateRequest, ReportRequest, Request, TrainRequest
 
-BATTERIES = {"base": "walk", "velocity": "speed", "terrain": "stairs", "push": "push"}
 REPORT = "report"
 
 
@@ -248,7 +248,7 @@ class Evaluating(Job):
 
     def asked(self, run: runs.Run) -> Asked:
         """Return everything that determines the result."""
-        words = (BATTERIES[self.training.plan.stage],)
+        words = battery.of_stage(self.training.plan.stage)
         return results.make_request(
             run,
             battery.batteries(words, self.levels),
@@ -268,7 +268,7 @@ class Evaluating(Job):
         return EvaluateRequest(
             run=str(self.training.output(folder)),
             checkpoint=self.training.iterations,
-            battery=BATTERIES[self.training.plan.stage],
+            battery=STAGES[self.training.plan.stage].battery,
             levels=self.levels,
             replicas=self.replicas,
             seconds=self.seconds,

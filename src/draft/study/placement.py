@@ -45,11 +45,11 @@ class Placement:
             DraftError: a number is out of range, or an option lacks another one.
         """
         if self.workers is not None and not 1 <= self.workers <= MOST_WORKERS:
-            cause = f"--workers {self.workers} is not from 1 to {MOST_WORKERS}"
+            cause = f"`workers` {self.workers} is not from 1 to {MOST_WORKERS}"
             raise DraftError(cause, "such as 2")
         if self.address is not None and not self.ray:
-            cause = "--address is for a Ray cluster"
-            raise DraftError(cause, "add --ray, or omit --address")
+            cause = "`address` is for a Ray cluster"
+            raise DraftError(cause, "add `ray`, or omit `address`")
 
 
 def expected_capacity(study: Study, placement: Placement) -> Capacity | None:
@@ -108,13 +108,13 @@ def _cluster_workers(study: Study, placement: Placement) -> Sequence[Worker]:
     gpus = int(resources.get("GPU", 0))
     if not gpus:
         cause = "the Ray cluster has no GPU"
-        raise DraftError(cause, "add a node that has one, or pass --device cpu")
+        raise DraftError(cause, 'add a node that has one, or pass `device="cpu"`')
     capacity = on_gpus(engine, replicas, workers)
     return [RayWorker(ray, 1, capacity.physics) for _ in range(workers or gpus)]
 
 
 def _devices(word: str) -> list[str]:
-    """Devices of `--device`; "auto" is all GPUs, unlike for a single training."""
+    """Devices of the argument `device`; "auto" is all GPUs, unlike for a single training."""
     torch = need("torch", "learn")
     if word == "auto":
         word = "all" if torch.cuda.is_available() else "cpu"

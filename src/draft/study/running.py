@@ -143,5 +143,5 @@ def check_number(name: str, value: float | None, most: float) -> None:
         DraftError: it is not, or it is NaN.
     """
     if value is not None and not 0 < value <= most:
-        cause = f"--{name} {value} is not above 0 and at most {most:g}"
+        cause = f"`{name}` {value} is not above 0 and at most {most:g}"
         raise DraftError(cause, "omit it for the default")

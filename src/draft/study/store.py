@@ -130,7 +130,7 @@ class Store:
                     write(path, text)
         except OSError as error:
             cause = f"cannot write '{self.folder}': {(error.strerror or str(error)).lower()}"
-            raise DraftError(cause, "choose another --out") from None
+            raise DraftError(cause, "choose another `out`") from None
         write(self.folder / FILE, self.study.text)
         self._old = {}
         self.save()
@@ -258,10 +258,10 @@ def _read_state(folder: Path, study: Study) -> Mapping[str, Any]:
             return {}
         except OSError as error:
             cause = f"cannot read '{folder}': {(error.strerror or str(error)).lower()}"
-            raise DraftError(cause, "choose another --out") from None
+            raise DraftError(cause, "choose another `out`") from None
         if others:
             cause = f"'{folder}' holds no study, but {min(others)}; it is kept"
-            raise DraftError(cause, "choose another --out")
+            raise DraftError(cause, "choose another `out`")
         return {}
     try:
         old = json.loads(path.read_text(encoding="utf-8"))
@@ -272,15 +272,15 @@ def _read_state(folder: Path, study: Study) -> Mapping[str, Any]:
         name, was_toy = str(old["name"]), bool(old["toy"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         cause = f"{path} cannot be read as a study: {error}"
-        remedy = "delete it to rebuild it from the outputs, or choose another --out"
+        remedy = "delete it to rebuild it from the outputs, or choose another `out`"
         raise DraftError(cause, remedy) from None
     if not known or not ours:
         cause = f"'{folder}' was written by another version of Draft"
-        raise DraftError(cause, "choose another --out")
+        raise DraftError(cause, "choose another `out`")
     if (name, was_toy) != (study.name, study.toy):
         which = f"{'the toy of ' * was_toy}study '{name}'"
         cause = f"'{folder}' is of {which}; it is kept"
-        remedy = "choose another --out, or repeat the command that started it"
+        remedy = "choose another `out`, or repeat the command that started it"
         raise DraftError(cause, remedy)
     return old
 

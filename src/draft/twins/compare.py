@@ -32,7 +32,7 @@ from draft.imports.notes import merged
 from draft.imports.options import KneeDrive, Options
 from draft.imports.reduce import Body, Reduced
 from draft.imports.sources import find_source
-from draft.laws.structure import USES, read_population
+from draft.laws.structure import USES, population, read_population
 from draft.model import Model
 from draft.spec import Spec
 from draft.twins.causes import LARGE, MOVES, Cause, OtherKnees, causes, change
@@ -233,9 +233,9 @@ def check_poses(poses: int, seed: int) -> None:
         DraftError: it is.
     """
     if not 2 <= poses <= 100_000:
-        raise DraftError(f"--poses {poses} is not from 2 to 100000", "such as 300")
+        raise DraftError(f"`poses` {poses} is not from 2 to 100000", "such as 300")
     if seed < 0:
-        raise DraftError(f"--seed {seed} is below 0", "such as 0")
+        raise DraftError(f"`seed` {seed} is below 0", "such as 0")
 
 
 def resolve_without(choice: DesignChoice, without: Collection[str]) -> Design:
@@ -248,8 +248,9 @@ def resolve_without(choice: DesignChoice, without: Collection[str]) -> Design:
         return choice.resolve()
     own = choice.spec.structure
     # With a file of its own, the spec is held out of the shipped survey all the same.
-    uses = own if isinstance(own, str) else read_population(choice.spec.population, own).uses
-    table = {USES: uses, **structure_trends(without=without)}
+    of = choice.spec.population
+    laws = population(of, own) if isinstance(own, str) else read_population(of, own)
+    table = {USES: laws.uses, **structure_trends(without=without)}
     file = Content(f"without_{len(without)}.json", json.dumps(table).encode())
     return replace(choice, spec=replace(choice.spec, structure=file)).resolve()
 

@@ -16,7 +16,7 @@ from draft import parallel
 from draft.errors import DraftError
 from draft.fitting.structure.parse import listed
 from draft.fitting.structure.robots import Robot
-from draft.fitting.structure.survey_rows import read
+from draft.laws.survey import read
 from draft.twins.compare import compare_twin
 from draft.twins.dynamics import POSES, SEED
 from draft.twins.record import plain, residuals

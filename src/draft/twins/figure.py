@@ -110,17 +110,16 @@ def survey(rows: Sequence[Row]) -> Figure:
     masses = [mass for row in rows for mass in (row.vendor_mass, row.low, row.high)]
     line = np.array([0.9 * min(masses), 1.1 * max(masses)])
     ax.plot(line, line, color=GREY, linewidth=0.6)
-    for people, (color, mark) in MARKS.items():
-        own = [row for row in rows if row.population == people]
+    for population, (color, mark) in MARKS.items():
+        own = [row for row in rows if row.population == population]
         if not own:
             continue
         x = np.array([row.vendor_mass for row in own])
         y = np.array([row.twin_mass for row in own])
         below, above = np.array([(row.low, row.high) for row in own]).T
         total = score(own)
-        label = (
-            f"{total.n} {people}s: fold {total.fold:.2f}, {100 * total.covered:.0f} % in the band"
-        )
+        fold, inside = f"{total.fold:.2f}", f"{100 * total.covered:.0f} %"
+        label = f"{total.n} {population}s: fold {fold}, {inside} in the band"
         ax.errorbar(
             x, y, (y - below, above - y), fmt="none", ecolor=color, alpha=0.35, linewidth=0.7
         )

@@ -369,7 +369,7 @@ SMALL = {"learning.hidden": [8, 8], "learning.steps": 4}
 
 def stock(env: Any) -> MjlabOnPolicyRunner:
     """mjlab's runner with rsl-rl's PPO."""
-    numbers = agent_settings(Config().with_values(SMALL).learning, "base", 5)
+    numbers = agent_settings(Config().with_values(SMALL), "base", 5)
     algorithm = numbers["algorithm"]
     algorithm["class_name"] = "rsl_rl.algorithms:PPO"
     for ours in ("symmetric", "least_rate"):
@@ -380,7 +380,7 @@ def stock(env: Any) -> MjlabOnPolicyRunner:
 def trained(env: Any, folder: Path) -> tuple[Runner, Path]:
     """A runner of ours after two iterations, and its checkpoint."""
     torch.set_default_dtype(torch.float32)
-    numbers = agent_settings(Config().with_values(SMALL).learning, "base", 1)
+    numbers = agent_settings(Config().with_values(SMALL), "base", 1)
     made = Runner(env, numbers, None, "cpu")
     made.learn(2)
     file = folder / "model_2.pt"

@@ -28,7 +28,7 @@ from draft.learn.training.ppo.ppo import Ppo
 from draft.learn.training.ppo.symmetry import Symmetric
 
 VALUES = {"learning.mirror": True, "learning.hidden": [16, 12], "learning.steps": 6}
-LEARNING = Config().with_values(VALUES).learning
+MIRRORED = Config().with_values(VALUES)
 SEEDS = st.integers(0, 2**31 - 1)
 
 
@@ -44,8 +44,8 @@ def env(members: tuple[LeggedRobot, ...]) -> Iterator[Any]:
 
 def runner(env: Any, **values: Any) -> Any:
     """A runner with the numbers of these tests, and some others."""
-    learning = Config().with_values(VALUES | values).learning
-    return Runner(RslRlVecEnvWrapper(env), agent_settings(learning, "base", 1), None, "cpu")
+    config = Config().with_values(VALUES | values)
+    return Runner(RslRlVecEnvWrapper(env), agent_settings(config, "base", 1), None, "cpu")
 
 
 def practise(of: Any, iterations: int) -> None:
@@ -53,7 +53,7 @@ def practise(of: Any, iterations: int) -> None:
     alg, seen = of.alg, of.env.get_observations()
     for _ in range(iterations):
         with torch.no_grad():
-            for _ in range(LEARNING.steps):
+            for _ in range(MIRRORED.learning.steps):
                 seen, rewards, dones, extras = of.env.step(alg.act(seen))
                 alg.process_env_step(seen, rewards, dones, extras)
             alg.compute_returns(seen)
@@ -338,8 +338,8 @@ def test_a_policy_without_symmetry_is_not_bent_into_one_that_has_it(env: Any, pa
 
 
 def test_the_number_turns_symmetric_networks_on(env: Any) -> None:
-    for learning, on in ((Config().learning, False), (LEARNING, True)):
-        algorithm: Any = agent(learning, "base").algorithm
+    for config, on in ((Config(), False), (MIRRORED, True)):
+        algorithm: Any = agent(config, "base").algorithm
         assert algorithm.symmetric is on
         assert getattr(algorithm, "symmetry_cfg", None) is None  # rsl-rl doubles samples so.
     for on in (False, True):

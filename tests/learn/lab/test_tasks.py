@@ -131,7 +131,7 @@ def test_a_changed_number_reaches_the_environment(members: Any) -> None:
 
 
 def test_the_agent_has_the_numbers_of_the_study() -> None:
-    found: Any = agent(Config().learning, "velocity", seed=3)
+    found: Any = agent(Config(), "velocity", seed=3)
     assert found.actor.hidden_dims == found.critic.hidden_dims == (512, 256, 128)
     assert (found.seed, found.num_steps_per_env, found.max_iterations) == (3, 24, 1800)
     ppo = found.algorithm

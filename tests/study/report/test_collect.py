@@ -181,7 +181,7 @@ def test_a_run_of_another_plan_is_refused_and_nothing_is_written(tmp_path: Path)
     said = str(refused.value)
     assert "run cheetah-velocity-1 is of another plan than cheetah-velocity-0" in said
     assert "environments, rewards.height differ; nothing was written" in said
-    assert "choose another --out" in said
+    assert "choose another `out`" in said
     assert contents(out) == before
 
 

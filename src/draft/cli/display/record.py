@@ -34,7 +34,7 @@ def record(
 ) -> str:
     """Return the object as text: verdict, masses, actuators, findings, timings, folder, more."""
     # Options of all commands bring this module: not all of those need MuJoCo.
-    from draft.model.folder import plain
+    from draft.values import plain
 
     actuators = {
         name: {"like": actuator.like} | {key: getattr(actuator, key) for key in actuator.quantities}

@@ -16,6 +16,7 @@ from rich.live import Live
 from rich.table import Table
 
 from draft.cli.display.verdict import console
+from draft.cli.spelling import spelt
 from draft.study.capacity import Capacity
 from draft.study.costs import Estimate, setting
 from draft.study.execution import Watch
@@ -62,7 +63,7 @@ def print_plan(store: Store, estimate: Estimate, capacity: Capacity | None, json
     count = estimate.at_once
     words = f"{estimate.total / count:,.2f} {estimate.unit} are left"
     words += f" with {count} jobs at once" * (count > 1)
-    out.print(f"{_counts(store.states)}; {words}: {estimate.source}")
+    out.print(f"{_counts(store.states)}; {words}: {spelt(estimate.source)}")
 
 
 def _capacity_record(capacity: Capacity | None) -> dict[str, str | int | None]:
@@ -102,7 +103,7 @@ def print_notes(store: Store) -> None:
     """Print what drawing the families of a study refused, on stderr."""
     for group in store.groups:
         if group.note:
-            print(group.note, file=sys.stderr)
+            print(spelt(group.note), file=sys.stderr)
 
 
 def print_outcome(outcome: Outcome, json: bool) -> None:
@@ -114,7 +115,7 @@ def print_outcome(outcome: Outcome, json: bool) -> None:
         print(json_.dumps(record | {"failures": outcome.failures}, indent=1))
         return
     for name, reason in outcome.failures.items():
-        print(f"{name} failed: {reason}", file=sys.stderr)
+        print(f"{name} failed: {spelt(reason)}", file=sys.stderr)
     print(_counts(outcome.jobs))
     if outcome.report is not None:
         print(f"report: {outcome.report}")

@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from draft.cli.display.verdict import console
+from draft.cli.spelling import spelt
 from draft.errors import counted
 from draft.values import scalar
 
@@ -23,7 +24,7 @@ def print_one(found: Comparison) -> None:
     out = console()
     reduced = found.files.reduced
     for note in reduced.notes:
-        out.print(f"[yellow]warning[/] {escape(str(note))}")
+        out.print(f"[yellow]warning[/] {escape(spelt(str(note)))}")
     if found.unmatched:
         out.print(f"[yellow]warning[/] the spec lacks {escape(', '.join(found.unmatched))}")
     if reduced.counts:
@@ -58,7 +59,7 @@ def _print_causes(found: Comparison) -> None:
     if other is not None:
         place, why = found.files.knees.place, found.files.knees.why
         print(
-            f"knees driven at the {place} ({why}); at the {other.place}, --knee-drive "
+            f"knees driven at the {place} ({spelt(why)}); at the {other.place}, --knee-drive "
             f"{other.place}, M(q) moves by {other.change:.0f} %: then M(q) is off by "
             f"{other.inertia.median:.1f} %, g(q) by {other.gravity.median:.1f} %"
         )
@@ -127,14 +128,14 @@ def print_all(rows: Sequence[Row], failed: Sequence[Failure]) -> None:
         )
     out.print(shown)
     for one in failed:
-        out.print(f"[bold red]refused[/] [bold]{escape(one.robot)}[/] {escape(one.cause)}")
-    for people in sorted({row.population for row in rows}):
-        own = [row for row in rows if row.population == people and row.fitted]
+        out.print(f"[bold red]refused[/] [bold]{escape(one.robot)}[/] {escape(spelt(one.cause))}")
+    for population in sorted({row.population for row in rows}):
+        own = [row for row in rows if row.population == population and row.fitted]
         if own:
             total = score(own)
             print(
-                f"{total.n} {people}s that the trends are fitted to, each held out: mass off by a "
-                f"factor of {total.fold:.3f} (geometric mean), mean ln {total.bias:+.3f}, "
+                f"{total.n} {population}s that the trends are fitted to, each held out: mass off "
+                f"by a factor of {total.fold:.3f} (geometric mean), mean ln {total.bias:+.3f}, "
                 f"{100 * total.covered:.0f} % inside their band"
             )
     print(f"{len(rows)} twins, {len(failed) or 'none'} refused")

@@ -12,12 +12,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from draft.fitting.structure.classes import BASE
 from draft.fitting.structure.robots import disclosed_units, hosts
-from draft.fitting.structure.roles import priced
-from draft.fitting.structure.survey_rows import LIGHTEST, SHORTEST, Row
+from draft.laws.joint_roles import priced
+from draft.laws.segment_classes import BASE
+from draft.laws.survey import LIGHTEST, SHORTEST, Row, usable
 
-STRONGEST = 1000.0
 # The mass trend of `draft.laws.actuators` in the digits behind the published table. All digits
 # would change three published figures, since some structural masses are almost zero.
 MASS = (0.065255, 0.6662)
@@ -92,11 +91,6 @@ class Machine:
     def remote_knees(self) -> bool:
         """Whether its knees are driven from the hip (quadrupeds)."""
         return self.key in hosts() and hosts()[self.key].remote
-
-
-def usable(effort: float) -> bool:
-    """Whether a declared torque [N m] gives an actuator mass: above 0, at most 1000."""
-    return math.isfinite(effort) and 0.0 < effort <= STRONGEST
 
 
 def price(robot: str, effort: float) -> float:

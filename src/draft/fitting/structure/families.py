@@ -19,8 +19,8 @@ from draft.fitting.structure.attribution import Machine, machines
 from draft.fitting.structure.calibrated import OF_VOLUME, trunk_volume
 from draft.fitting.structure.fits import TRUNKS
 from draft.fitting.structure.robots import robots as known
-from draft.fitting.structure.survey_rows import FILE, read
 from draft.fitting.structure.whole import leg_length
+from draft.laws.survey import FILE, read
 
 # Pairs whose legs differ by less say nothing about legs.
 LEAST_LEG = 1.03

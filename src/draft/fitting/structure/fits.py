@@ -16,15 +16,14 @@ import numpy as np
 from draft.fitting import least_squares
 from draft.fitting.scores import fold_error
 from draft.fitting.structure.attribution import Machine, Piece
-from draft.fitting.structure.classes import BASE
 from draft.fitting.structure.robots import excluded_segments
 from draft.laws.law import Law, Term
+from draft.laws.segment_classes import BASE
 from draft.values import Array
 
 FEWEST = 4
 SOURCE = (
-    "fitted to draft/fitting/structure/data/segments.csv by the method of arXiv 2609.38405, "
-    "structure trends"
+    "fitted to draft/laws/data/segments.csv by the method of arXiv 2609.38405, structure trends"
 )
 LENGTH, VOLUME = ("length", "m", "L"), ("volume", "m3", "V")
 TRUNKS = (BASE, "torso")

@@ -15,10 +15,11 @@ from draft.description.read import describe
 from draft.description.segments import Segment, segments
 from draft.description.xmlfile import DescriptionError
 from draft.errors import DraftError, Location, Problem
-from draft.fitting.structure import classes, roles
-from draft.fitting.structure.attribution import machine, usable
+from draft.fitting.structure.attribution import machine
 from draft.fitting.structure.robots import Robot, hosts, read_manifest, robots
-from draft.fitting.structure.survey_rows import Row
+from draft.laws import joint_roles as roles
+from draft.laws import segment_classes as classes
+from draft.laws.survey import Row, usable
 
 SUFFIXES = (".urdf", ".xml", ".mjcf")
 HEAVIEST = 0.65

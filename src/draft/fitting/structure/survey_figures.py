@@ -25,10 +25,10 @@ from draft.fitting.structure import survey_holdout as holdout
 from draft.fitting.structure import survey_published as published
 from draft.fitting.structure.attribution import Machine, machines
 from draft.fitting.structure.robots import robots as known
-from draft.fitting.structure.survey_rows import read
 from draft.laws.catalogue import Part
 from draft.laws.law import Law
 from draft.laws.structure import population
+from draft.laws.survey import read
 from draft.values import Array
 
 if TYPE_CHECKING:

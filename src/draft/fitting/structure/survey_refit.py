@@ -23,10 +23,10 @@ from draft.fitting.structure import survey_holdout as holdout
 from draft.fitting.structure.attribution import Machine, Piece, machines
 from draft.fitting.structure.robots import robots as known
 from draft.fitting.structure.survey_published import classes, printed
-from draft.fitting.structure.survey_rows import FILE as ROWS
-from draft.fitting.structure.survey_rows import read
 from draft.laws.law import Law, Term
 from draft.laws.structure import FILE, USES, Centre
+from draft.laws.survey import FILE as ROWS
+from draft.laws.survey import read
 from draft.values import Array
 
 SOURCE = f"{fits.SOURCE}; allometry from its released data"

@@ -22,7 +22,7 @@ from draft.values import Array
 
 LEG = ("thigh", "shank")
 SIZE = "thigh + shank"
-SOURCE = "fitted to draft/fitting/structure/data/segments.csv, docs/structure-trends.md"
+SOURCE = "fitted to draft/laws/data/segments.csv, docs/structure-trends.md"
 
 
 def leg_length(robot: Machine) -> float:

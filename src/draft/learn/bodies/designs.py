@@ -77,8 +77,8 @@ def open_bodies(
     if len(vary):
         return _drawn(designs, vary, count, given, seed)
     if count is not None:
-        cause = "--bodies draws designs, but nothing is varied"
-        raise DraftError(cause, "add --vary NAME=LOW:HIGH, or omit --bodies")
+        cause = "`bodies` draws designs, but nothing is varied"
+        raise DraftError(cause, "add `vary` NAME=LOW:HIGH, or omit `bodies`")
     texts = tuple(design_text(design) for design in designs)
     return Bodies(designs[0].spec, family(designs), texts)
 
@@ -94,14 +94,14 @@ def _drawn(
     from draft.explore import vary as axes
 
     if len(designs) != 1:
-        cause = f"--vary varies one design, but {len(designs)} are named"
+        cause = f"`vary` varies one design, but {len(designs)} are named"
         raise DraftError(cause, "name one")
     if count is None or not 1 <= count <= MOST:
         given = "is missing" if count is None else f"{count} is not from 1 to {MOST}"
-        remedy = "give the number of designs to draw, such as --bodies 64"
-        raise DraftError(f"--bodies {given}", remedy)
+        remedy = "give the number of designs to draw, such as `bodies=64`"
+        raise DraftError(f"`bodies` {given}", remedy)
     if not 0 <= seed < 1 << 63:
-        raise DraftError(f"--seed {seed} is not from 0 to 2**63 - 1", "such as 0")
+        raise DraftError(f"`seed` {seed} is not from 0 to 2**63 - 1", "such as 0")
     check_topology(designs[0])
     draws = _Draws(designs[0], axes.parse(designs[0].spec, vary, values), seed)
     draws.draw(count)
@@ -198,7 +198,7 @@ class _Draws:
             if len(self.members) == count:
                 return
         cause = f"only {len(self.members)} of {self.count} drawn bodies pass, not {count}"
-        remedy = f"{self.reasons()}; narrow the ranges of --vary, or ask for fewer --bodies"
+        remedy = f"{self.reasons()}; narrow the ranges of `vary`, or ask for fewer `bodies`"
         raise DraftError(cause, remedy)
 
     def _accept(self, block: Design, count: int) -> None:

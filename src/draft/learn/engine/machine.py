@@ -22,7 +22,7 @@ from draft.extras import installed, need
 EngineName = Literal["auto", "native", "warp"]
 NATIVE, WARP = "native", "warp"
 KINDS = {NATIVE: "native MuJoCo", WARP: "MuJoCo Warp"}
-_WARP_REMEDY = "use --engine warp, which runs anywhere and is some 15 times slower on a CPU"
+_WARP_REMEDY = 'use `engine="warp"`, which runs anywhere and is some 15 times slower on a CPU'
 _REQUIRED = ("torch", "mjlab")
 # Device files of GPU drivers on Linux: NVIDIA, NVIDIA on boards, Windows' Linux, AMD.
 DEVICE_FILES = Path("/dev")
@@ -75,11 +75,11 @@ class Machine:
 
 
 def this_machine(device: str = "auto", engine: str = "auto", ask: bool = True) -> Machine:
-    """Find out what `draft train` would use on this machine.
+    """Find out what a training would use on this machine.
 
     Args:
-        device: value of `--device`; the CPU without PyTorch or a GPU driver.
-        engine: value of `--engine`.
+        device: as `draft.train` takes it; the CPU without PyTorch or a GPU driver.
+        engine: as `draft.train` takes it.
         ask: import PyTorch where there may be a GPU; else a GPU is assumed if there is a driver.
 
     Raises:
@@ -96,7 +96,7 @@ def this_machine(device: str = "auto", engine: str = "auto", ask: bool = True) -
 
 
 def devices(name: str) -> list[str]:
-    """Return the devices that a value of `--device` names.
+    """Return the devices that an argument `device` names.
 
     Args:
         name: "auto", "cpu", "cuda", "cuda:1", "all" (GPUs), or numbers of GPUs such as "0,1".
@@ -118,11 +118,11 @@ def devices(name: str) -> list[str]:
         remedy = "use cpu, cuda, cuda:1, all, or numbers of GPUs such as 0,1"
         raise DraftError(f"there is no device '{name}'", remedy)
     if not count:
-        cause = f"--device {name}: PyTorch finds no GPU"
-        remedy = "use --device cpu, with few worlds to try things out"
+        cause = f"`device` {name}: PyTorch finds no GPU"
+        remedy = 'use `device="cpu"`, with few worlds to try things out'
         raise DraftError(cause, remedy)
     if any(int(part) >= count for part in chosen) or len(set(chosen)) < len(chosen):
-        cause = f"--device {name}: this machine has {counted(count, 'GPU')}, numbered from 0"
+        cause = f"`device` {name}: this machine has {counted(count, 'GPU')}, numbered from 0"
         raise DraftError(cause, "name existing GPUs, each once")
     return [f"cuda:{part}" for part in chosen]
 
@@ -171,13 +171,13 @@ def choose(name: str, devices: Sequence[str]) -> Engine:
     if name == "auto" and not on_cpu:
         return Engine(WARP, "it runs on the GPU")
     if not on_cpu:
-        cause = f"--engine native runs on the CPU, not on {', '.join(devices)}"
-        raise DraftError(cause, "add --device cpu, or use --engine warp")
+        cause = f'`engine="native"` runs on the CPU, not on {", ".join(devices)}'
+        raise DraftError(cause, 'add `device="cpu"`, or use `engine="warp"`')
     missing = obstacle()
     if missing is None:
         return Engine(NATIVE, "requested" if name == NATIVE else "the fastest without a GPU")
     if name == NATIVE:
-        raise DraftError(f"--engine native: {missing}", _WARP_REMEDY)
+        raise DraftError(f'`engine="native"`: {missing}', _WARP_REMEDY)
     return Engine(WARP, f"native MuJoCo cannot be used: {missing}")
 
 
@@ -238,7 +238,7 @@ def replicas(
     """Number of processes that share a run on a CPU.
 
     Args:
-        requested: value of `--replicas`; None for one per physical core.
+        requested: number asked for; None for one per physical core.
         environments: worlds of the run, divided among the processes.
         engine: the engine; MuJoCo Warp uses one process on a CPU unless more are requested.
         devices: as `devices` names them.
@@ -248,20 +248,20 @@ def replicas(
     """
     if list(devices) != ["cpu"]:
         if requested is not None:
-            cause = f"--replicas {requested} is for a CPU; on GPUs there is one process per device"
-            raise DraftError(cause, "omit --replicas, or add --device cpu")
+            cause = f"`replicas` {requested} is for a CPU; on GPUs there is one process per device"
+            raise DraftError(cause, 'omit `replicas`, or add `device="cpu"`')
         return len(devices)
     most = cores()
     if requested is None:
         return min(most, environments) if engine.name == NATIVE else 1
     if not 0 < requested <= most:
-        cause = f"--replicas {requested}: this machine has {most} physical cores for this process"
+        cause = f"`replicas` {requested}: this machine has {most} physical cores for this process"
         raise DraftError(cause, f"choose 1 to {most}")
     if requested > environments:
         verb = "is" if environments == 1 else "are"
         worlds = f"there {verb} only {counted(environments, 'world')} to divide"
-        cause = f"--replicas {requested}: {worlds}"
-        raise DraftError(cause, f"add --envs {requested} or more")
+        cause = f"`replicas` {requested}: {worlds}"
+        raise DraftError(cause, f"add `envs={requested}` or more")
     return requested
 
 
@@ -297,7 +297,7 @@ def check_memory(worlds: int, steps: int, observations: int, processes: int) -> 
     if free is not None and needed > free:
         most = int(worlds * max(0.0, free - processes * _PER_PROCESS) / needed)
         cause = f"{worlds} worlds need some {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free"
-        raise DraftError(cause, f"add --envs {max(most // 64 * 64, 64)} or fewer")
+        raise DraftError(cause, f"add `envs={max(most // 64 * 64, 64)}` or fewer")
 
 
 def free_memory() -> float | None:

@@ -65,7 +65,7 @@ def run_processes(
         KeyboardInterrupt: on Ctrl-C or SIGTERM: once all have stopped as `asked_to_stop` asks them
             to, or at once if none has sent a message yet.
     """
-    need_posix("training in several processes", "add --replicas 1, or use WSL")
+    need_posix("training in several processes", "add `replicas=1`, or use WSL")
     import torchrunx
 
     with tempfile.TemporaryDirectory(prefix="draft-") as folder, _Server(folder, receive) as server:
@@ -85,7 +85,7 @@ def run_processes(
             raise _error(server, Problem(cause, None, f"see their logs in {logs}")) from None
         except (RuntimeError, OSError) as error:
             cause = f"torchrunx cannot run {count} processes: {error}"
-            remedy = "use one process: --device 0, or --replicas 1 on a CPU"
+            remedy = "use one process: `device=0`, or `replicas=1` on a CPU"
             raise _error(server, Problem(cause, None, remedy)) from None
         if server.error is not None:
             raise server.error

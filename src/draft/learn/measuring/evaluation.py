@@ -26,6 +26,7 @@ from draft.learn.measuring.results import (
 )
 from draft.learn.measuring.summary import PROTOCOLS, Protocol, Request, Summary
 from draft.learn.silence import quiet
+from draft.learn.task.stages import is_like
 from draft.learn.training.reached import Reached
 from draft.learn.training.run import Run, is_run, open_run
 from draft.spec import Spec
@@ -61,7 +62,7 @@ class Guest(Run):
         member = legged_robot(design)
         source.match(member)
         config = source.plan.config
-        if source.plan.stage == "push":
+        if is_like(source.plan.stage, "push"):
             config = config.with_values({"push.forward": source.forward})
         name = Path(design.reference).name.replace(":", "-")
         stem = source.file.stem if policy is None else Path(policy).resolve().stem
@@ -79,8 +80,8 @@ class Guest(Run):
             DraftError: another number of iterations is asked for.
         """
         if iteration not in (None, self.source.iteration):
-            cause = f"--checkpoint is for runs, and {self.plan.members[0].name} is a design"
-            raise DraftError(cause, "omit --checkpoint")
+            cause = f"`checkpoint` is for runs, and {self.plan.members[0].name} is a design"
+            raise DraftError(cause, "omit `checkpoint`")
         return self.source.iteration, self.source.file
 
     def reached(self, iteration: int) -> Reached:
@@ -170,14 +171,14 @@ def opened(run: Run | Design | Spec | str | Path, policy: str | Path | None = No
     if policy is None and (isinstance(run, Run) or (named and is_run(Path(run)))):
         return run if isinstance(run, Run) else open_run(Path(run))
     if isinstance(run, Run) or (named and is_run(Path(run))):
-        cause = f"--policy is for designs, and {run} is a run, which has its own"
-        raise DraftError(cause, "omit --policy, or name a design")
+        cause = f"`policy` is for designs, and {run} is a run, which has its own"
+        raise DraftError(cause, "omit `policy`, or name a design")
     if named:
         try:
             find_design(run)
         except DraftError:
-            cause = f"'{run}' is neither a run of 'draft train' nor a design"
-            remedy = "name a folder of 'draft train', or a robot"
+            cause = f"'{run}' is neither a run of `draft.train` nor a design"
+            remedy = "name a folder of `draft.train`, or a robot"
             raise DraftError(cause, remedy) from None
     return Guest.of(run, policy)
 
@@ -324,8 +325,8 @@ def setting(device: str = "auto", engine: str = "auto") -> tuple[str, Engine]:
     need("pyarrow", "learn")  # Checked before the work, not after it.
     chosen = devices(device)
     if len(chosen) > 1:
-        cause = f"--device {device} names {len(chosen)} GPUs, and an evaluation uses one"
-        raise DraftError(cause, "pass --device cuda:0, and others for other runs")
+        cause = f"`device` {device} names {len(chosen)} GPUs, and an evaluation uses one"
+        raise DraftError(cause, 'pass `device="cuda:0"`, and others for other runs')
     return chosen[0], choose(engine, chosen)
 
 
@@ -349,18 +350,18 @@ def check(
         DraftError: one is out of range.
     """
     if not 0 < replicas <= 10**6:
-        cause = f"--replicas {replicas} is not above 0 and at most {10**6}"
+        cause = f"`replicas` {replicas} is not above 0 and at most {10**6}"
         raise DraftError(cause, "such as 256")
     if not 0.5 <= seconds <= 3600:
-        cause = f"--seconds {seconds:g} is not from 0.5 to 3600"
+        cause = f"`seconds` {seconds:g} is not from 0.5 to 3600"
         raise DraftError(cause, "omit it for 12")
     if not 0 <= seed < 2**31:
-        raise DraftError(f"--seed {seed} is not from 0 to 2**31 - 1", "such as 0")
+        raise DraftError(f"`seed` {seed} is not from 0 to 2**31 - 1", "such as 0")
     if not 0 <= payload <= HEAVIEST:
-        cause = f"--payload {payload:g} is not from 0 to {HEAVIEST:g} kg"
+        cause = f"`payload` {payload:g} is not from 0 to {HEAVIEST:g} kg"
         raise DraftError(cause, "omit it for no payload")
     if not 0 <= regeneration <= 1:
-        cause = f"--regeneration {regeneration:g} is not a share from 0 to 1"
+        cause = f"`regeneration` {regeneration:g} is not a share from 0 to 1"
         raise DraftError(cause, "omit it for no regeneration, or give 0.5")
 
 

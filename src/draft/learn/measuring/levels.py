@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 from draft.errors import DraftError, suggest
 from draft.learn.task.constants import ramp_at
+from draft.learn.task.stages import STAGES, is_like
 from draft.learn.training.reached import UNRECORDED, Reached
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ class Battery:
 
     Attributes:
         name: its name.
-        stage: stage of the policies that it is for.
         ground: "flat", or "ascent" and "descent" for stairs.
         unit: unit of the levels.
         levels: the levels, rising.
@@ -39,7 +39,6 @@ class Battery:
     """
 
     name: str
-    stage: str
     ground: Literal["flat", "ascent", "descent"]
     unit: str
     levels: tuple[float, ...]
@@ -63,14 +62,14 @@ _KICKS = tuple(1.0 + 0.5 * i for i in range(23))
 BATTERIES = {
     battery.name: battery
     for battery in (
-        Battery(SPEED, "velocity", "flat", "m/s", _SPEEDS),
-        Battery(ASCENT, "terrain", "ascent", "m", _STEPS),
-        Battery(DESCENT, "terrain", "descent", "m", _STEPS),
-        Battery(PUSH, "push", "flat", "m/s", _KICKS),
-        Battery(WALK, "base", "flat", "m/s", (WALKING,)),
+        Battery(SPEED, "flat", "m/s", _SPEEDS),
+        Battery(ASCENT, "ascent", "m", _STEPS),
+        Battery(DESCENT, "descent", "m", _STEPS),
+        Battery(PUSH, "flat", "m/s", _KICKS),
+        Battery(WALK, "flat", "m/s", (WALKING,)),
     )
 }
-# Names on the command line, in the order of the stages.
+# Names on the command line, in the order of the published stages.
 WORDS = {"walk": (WALK,), "speed": (SPEED,), "stairs": (ASCENT, DESCENT), "push": (PUSH,)}
 
 
@@ -90,13 +89,13 @@ def named(text: str) -> tuple[str, ...]:
             remedy = suggest(word, WORDS, "batteries")
             raise DraftError(f"there is no battery '{word}'", remedy)
     if not words:
-        raise DraftError("--battery names none", f"batteries: {', '.join(WORDS)}")
+        raise DraftError("`battery` names none", f"batteries: {', '.join(WORDS)}")
     return tuple(dict.fromkeys(words))
 
 
 def of_stage(stage: str) -> tuple[str, ...]:
     """Return the names of the batteries for policies of a stage."""
-    return tuple(word for word, names in WORDS.items() if BATTERIES[names[0]].stage == stage)
+    return (STAGES[stage].battery,)
 
 
 def batteries(
@@ -121,8 +120,8 @@ def batteries(
         return tuple(replace(b, levels=spread(b.levels, levels)) for b in chosen)
     said, values = ",".join(f"{value:g}" for value in levels), tuple(sorted({*levels}))
     if len(words) > 1:
-        cause = f"--levels {said} gives the levels of one battery, and there are {len(words)}"
-        raise DraftError(cause, "name one --battery, or give a number of levels")
+        cause = f"`levels` {said} gives the levels of one battery, and there are {len(words)}"
+        raise DraftError(cause, "name one `battery`, or give a number of levels")
     largest = _LARGEST[chosen[0].name]
     if not values or not all(0.0 < value <= largest for value in values):
         raise no_levels(said, largest)
@@ -131,7 +130,7 @@ def batteries(
 
 def no_levels(given: str, most: float | None = None) -> DraftError:
     """Error of levels that are neither a number of them nor above 0 and at most `most`."""
-    cause = f"--levels {given} is neither a number of levels nor levels above 0"
+    cause = f"`levels` {given} is neither a number of levels nor levels above 0"
     cause += "" if most is None else f" and at most {most:g}"
     return DraftError(cause, "such as 5, or 0.4,1.0,2.0")
 
@@ -168,13 +167,13 @@ def check_stage(chosen: Sequence[Battery], stage: str, run: object) -> None:
         DraftError: one is for another stage.
     """
     for battery in chosen:
-        if battery.stage != stage:
+        if _word(battery) not in of_stage(stage):
             cause = (
-                f"battery '{_word(battery)}' is for policies of stage {battery.stage}, and {run} "
-                f"is of stage {stage}"
+                f"battery '{_word(battery)}' is for policies of stage {_stages(battery)}, and "
+                f"{run} is of stage {stage}"
             )
             own = ", ".join(of_stage(stage))
-            raise DraftError(cause, f"use --battery {own}, or add --force")
+            raise DraftError(cause, f"use `battery` {own}, or add `force`")
 
 
 def flags(
@@ -190,9 +189,9 @@ def flags(
     """
     notes = []
     for battery in chosen:
-        if battery.stage != plan.stage:
+        if _word(battery) not in of_stage(plan.stage):
             notes.append(
-                f"{battery.name}: for policies of stage {battery.stage}; this one is of stage "
+                f"{battery.name}: for policies of stage {_stages(battery)}; this one is of stage "
                 f"{plan.stage}"
             )
         most = trained(battery.name, plan, iteration, reached)
@@ -217,25 +216,30 @@ def trained(name: str, plan: Plan, iteration: int, reached: Reached = UNRECORDED
     config, stage = plan.config, plan.stage
     root = min(member.scale for member in plan.members) ** 0.5
     if name in (ASCENT, DESCENT):
-        mix = config.terrain if stage == "terrain" else config.ground
+        mix = config.terrain if STAGES[stage].shares == "terrain" else config.ground
         if plan.ground != "uneven" or not mix.stairs:
             return 0.0
         last = max(config.ground.rows - 1, 1)
         share = min((mix.start_rows - 1 if reached.row is None else reached.row) / last, 1.0)
         return mix.step[0] + share * (mix.step[1] - mix.step[0])
     if name == PUSH:
-        if stage == "push":
+        if is_like(stage, "push"):
             return min(config.push.linear[:2]) * ramp_at(config.push.ramp, max(iteration - 1, 0))
         return min(config.episodes.push_linear[:2]) * root
-    if stage == "velocity" and config.velocity.growth and reached.fastest is not None:
+    if is_like(stage, "velocity") and config.velocity.growth and reached.fastest is not None:
         return reached.fastest
-    if stage == "velocity" and not config.velocity.growth:
+    if is_like(stage, "velocity") and not config.velocity.growth:
         return config.velocity.forward * ramp_at(config.velocity.ramp, max(iteration - 1, 0))
-    if stage == "push":
+    if is_like(stage, "push"):
         return config.push.forward
-    share = config.terrain.limit if stage == "terrain" else config.commands.limit
+    limited = config.terrain if is_like(stage, "terrain") else config.commands
     slowest = min(member.top_speed for member in plan.members)
-    return min(config.commands.forward * root, share * slowest)
+    return min(config.commands.forward * root, limited.limit * slowest)
+
+
+def _stages(battery: Battery) -> str:
+    """Names of the stages that a battery is for."""
+    return ", ".join(name for name in STAGES if _word(battery) in of_stage(name))
 
 
 def _word(battery: Battery) -> str:

@@ -18,6 +18,7 @@ from draft.learn.policy.validity import FAMILY_NAME, Region, departures, sentenc
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
 from draft.learn.task.recipes import LAPTOP
+from draft.learn.task.stages import is_like
 from draft.learn.training.reached import commanded
 from draft.learn.training.run import Plan, Run, file_digest, is_run, open_run
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from draft.learn.training.ppo.loaded import Policy as Actor
 
 _ROUNDED = 1e-4  # Relative difference of numbers that a file has rounded.
-_REMEDY = "train one on a family with --vary, --bodies and --see-design"
+_REMEDY = "train one on a family with `vary`, `bodies` and `see_design`"
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ class Source:
         found = match(self.joints, self.structure, member.joints, structure_of(member))
         if isinstance(found, str):
             cause = f"{self.name} does not drive the joints of {member.name}: {found}"
-            raise DraftError(cause, f"{_REMEDY}, and name it: --policy RUN")
+            raise DraftError(cause, f"{_REMEDY}, and name it: `policy=RUN`")
         return found
 
 
@@ -130,7 +131,7 @@ def of_run(run: Run, blind: bool = False) -> Source:
         raise DraftError(cause, _REMEDY)
     slowest = min(member.scale for member in plan.members)
     forward = scaled(plan.config.commands, "forward").at(slowest)
-    if plan.stage == "velocity":
+    if is_like(plan.stage, "velocity"):
         forward = max(forward, commanded(run) or 0.0)
 
     def network(device: str) -> Callable[[ManagerBasedRlEnv], Actor]:

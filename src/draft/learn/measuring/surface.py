@@ -131,7 +131,7 @@ def surface(
     refusal = tuple(first_error(many.findings, row) or reasons.get(row, "") for row in range(count))
     if all(refusal):
         cause = f"none of the {count} designs can be measured: {refusal[0]}"
-        raise DraftError(cause, "change the ranges of --vary")
+        raise DraftError(cause, "change the ranges of `vary`")
     return Surface(
         robot=design.reference,
         axes=(first.name, second.name),
@@ -153,7 +153,7 @@ def save(
         folder: folder to write, whole or not at all.
         record: settings that gave it.
         command: command that made it, for the page.
-        studio: command that lets the varied robot walk, up to the values of `--set`; "" for none.
+        studio: command that lets the varied robot walk, up to the values it adds; "" for none.
 
     Raises:
         DraftError: it cannot be written, or matplotlib is missing.
@@ -194,15 +194,15 @@ def _rising(axis: Axis) -> Axis:
     """
     listed = tuple(sorted(axis.values))
     if axis.low == axis.high or len(set(listed)) < len(listed):
-        cause = f"--vary {axis.name} needs different values, at least two, for a surface"
+        cause = f"`vary` {axis.name} needs different values, at least two, for a surface"
         raise DraftError(cause, f"such as {axis.name}=0.2:0.4, or 0.2,0.3,0.4")
     return replace(axis, values=listed)
 
 
 def _check(vary: Vary, points: int, replicas: int, seconds: float) -> None:
     if len(vary) != 2:
-        cause = f"a surface needs two ranges, and --vary has {len(vary)}"
-        remedy = "such as --vary thigh_length=0.2:0.4 actuators.leg.peak_torque=40:120"
+        cause = f"a surface needs two ranges, and `vary` has {len(vary)}"
+        remedy = "such as `vary` thigh_length=0.2:0.4 actuators.leg.peak_torque=40:120"
         raise DraftError(cause, remedy)
     for name, value, low, high in (
         ("points", points, 2, MOST_POINTS),
@@ -210,5 +210,5 @@ def _check(vary: Vary, points: int, replicas: int, seconds: float) -> None:
         ("seconds", seconds, 1.0, 1000.0),
     ):
         if not low <= value <= high:
-            cause = f"--{name} {value:g} is not from {low:g} to {high:g}"
+            cause = f"`{name}` {value:g} is not from {low:g} to {high:g}"
             raise DraftError(cause, "omit it for the default")

@@ -35,7 +35,7 @@ def page(found: Surface, command: str, studio: str = "") -> str:
     Args:
         found: the surface.
         command: command that made it.
-        studio: command that lets the varied robot walk, up to the values of `--set`; "" for none.
+        studio: command that lets the varied robot walk, up to the values it adds; "" for none.
     """
     measured = sum(not text for text in found.refusal)
     outside = sum(

@@ -1,6 +1,6 @@
 """Feed-forward networks in ONNX files, read and evaluated with NumPy only.
 
-It reads the files that `draft play --onnx` writes: a chain of Sub, Div, Gemm, Elu and Cast with
+It reads the files that `draft play` writes: a chain of Sub, Div, Gemm, Elu and Cast with
 weights of single or half precision. The file is decoded by the wire format of Protocol Buffers
 (https://protobuf.dev/programming-guides/encoding) and the field numbers of onnx.proto.
 """
@@ -78,7 +78,7 @@ class Network:
             layers = [(weight, bias) for weight, bias in more]
         except ValueError:
             cause = "the network has another form than a policy of Draft"
-            remedy = "use one that 'draft play RUN --onnx' wrote"
+            remedy = "use a file that 'draft play' wrote"
             raise DraftError(cause, remedy) from None
         return mean.reshape(-1), divisor.reshape(-1), layers
 
@@ -102,7 +102,7 @@ def read(path: Path) -> Network:
         cause, remedy = f"cannot read {path}: {error.strerror}", "check its name"
     except (ValueError, KeyError, IndexError, struct.error) as error:
         cause = f"{path} is not a policy that Draft can read: {error}"
-        remedy = "use one that 'draft play RUN --onnx' wrote"
+        remedy = "use a file that 'draft play' wrote"
     raise DraftError(cause, remedy) from None
 
 

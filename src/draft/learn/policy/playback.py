@@ -20,7 +20,8 @@ from draft.learn.policy.policy import SKILLS, Policy, designs, open_policy, shor
 from draft.learn.policy.policy import policy as shipped
 from draft.learn.policy.scenery import dress
 from draft.learn.policy.validity import check_drives, fit
-from draft.learn.task.config import Config
+from draft.learn.task.groups import Episodes, Ground
+from draft.learn.task.stages import is_like
 from draft.model import Model
 
 Command = tuple[float, float, float]
@@ -31,7 +32,7 @@ FASTEST, TALLEST = 100.0, 0.6  # Largest command or kick [m/s]; height of steps 
 MOST_SECONDS = 600.0  # Longest playback [s].
 KICK_EVERY = 3.0  # Time between two kicks [s].
 # Depth of steps and criteria of a fall are those of training.
-_TREAD, _EPISODES = Config().ground.tread, Config().episodes
+_TREAD, _EPISODES = Ground().tread, Episodes()
 
 
 @dataclass(frozen=True)
@@ -225,7 +226,7 @@ def play(
     Args:
         design: the robot, or its name.
         skill: "walk", "run", "climb" or "push"; None for "walk".
-        policy: an ONNX file that `draft play RUN --onnx` wrote; None for a shipped policy.
+        policy: an ONNX file that `draft play` wrote; None for a shipped policy.
         command: vx, vy [m/s], wz [rad/s]; None for straight ahead, as fast as suits the policy.
         step: height of the steps ahead [m]; None for that of the skill.
         kick: largest kick along x and y, every few seconds [m/s]; None for that of the skill.
@@ -255,14 +256,14 @@ def check(command: Command | None, step: float | None, kick: float | None, secon
     if command is not None and not all(
         math.isfinite(value) and abs(value) <= FASTEST for value in command
     ):
-        cause = f"--command {' '.join(f'{value:g}' for value in command)} is out of range"
+        cause = f"`command` {' '.join(f'{value:g}' for value in command)} is out of range"
         raise DraftError(cause, f"give three numbers from {-FASTEST:g} to {FASTEST:g}")
     for name, value, most, unit in (("step", step, TALLEST, "m"), ("kick", kick, FASTEST, "m/s")):
         if value is not None and not 0 <= value <= most:
-            cause = f"--{name} {value:g} is not from 0 to {most:g} {unit}"
+            cause = f"`{name}` {value:g} is not from 0 to {most:g} {unit}"
             raise DraftError(cause, "omit it for the default of the skill")
     if not 0 < seconds <= MOST_SECONDS:
-        cause = f"--seconds {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
+        cause = f"`seconds` {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
         raise DraftError(cause, "such as 8")
 
 
@@ -317,9 +318,9 @@ def usual(policy: Policy, stage: str) -> Scenario:
         stage: that of the policy, or of the skill that it is to show.
     """
     # Policies of kicks may stand still at slow commands, which are as near to theirs as to none.
-    share = 0.8 if stage in ("velocity", "push") else 0.5
+    share = 0.8 if is_like(stage, "velocity") or is_like(stage, "push") else 0.5
     return Scenario(
         command=(share * policy.forward, 0.0, 0.0),
-        step=0.1 if stage == "terrain" else 0.0,
-        kick=2.0 if stage == "push" else 0.0,
+        step=0.1 if is_like(stage, "terrain") else 0.0,
+        kick=2.0 if is_like(stage, "push") else 0.0,
     )

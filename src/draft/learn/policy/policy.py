@@ -1,7 +1,7 @@
 """Trained policies as functions from observations to actions, with NumPy only.
 
 Policies of the shipped designs are part of the package, in `robots/quadruped/policies`; export
-others from a run of `draft train` with `draft play RUN --onnx`.
+others from a run of `draft train` with `draft play`.
 """
 
 from __future__ import annotations
@@ -169,7 +169,7 @@ def policy(design: str, skill: str = "walk") -> Policy:
     name, shipped = short(design), designs()
     if name not in shipped:
         remedy = suggest(name, shipped, "designs with policies")
-        remedy += "; train others with 'draft train'"
+        remedy += "; train others with `draft.train`"
         raise DraftError(f"no policy of '{design}' is shipped", remedy)
     file = FOLDER / f"{name}-{skill}.onnx"
     if not file.is_file():
@@ -190,7 +190,7 @@ def designs() -> tuple[str, ...]:
 
 
 def open_policy(path: str | Path) -> Policy:
-    """Read a policy that `draft play RUN --onnx` wrote.
+    """Read a policy that `draft play` wrote.
 
     Args:
         path: ONNX file.
@@ -205,7 +205,7 @@ def open_policy(path: str | Path) -> Policy:
     except (KeyError, ValueError) as error:
         text = str(error).strip("'\"")
         cause = f"the metadata of {file} is missing or invalid: {text}"
-        raise DraftError(cause, "write it with 'draft play RUN --onnx'") from None
+        raise DraftError(cause, "write it with 'draft play'") from None
 
 
 def _policy(file: Path, network: Network) -> Policy:

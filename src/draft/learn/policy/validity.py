@@ -285,7 +285,7 @@ def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
     for member in members:
         if member.joints != policy.joints or (sees_design and not member.is_quadruped):
             cause = f"{policy.file} does not drive the joints of {member.name}"
-            remedy = "start from a policy of the same joints, or with --from scratch"
+            remedy = 'start from a policy of the same joints, or with `origin="scratch"`'
             raise DraftError(cause, remedy)
         if sees_design:
             continue
@@ -294,7 +294,7 @@ def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
         gaps = _outside(policy, region, member, seen, Match.of_equals(len(policy.joints)))
         if gaps:
             cause = f"{policy.file} is of another design than {member.name}: {gaps[0]}"
-            remedy = "name a policy of the same design, or one that was trained with --see-design"
+            remedy = "name a policy of the same design, or one that was trained with `see_design`"
             raise DraftError(cause, remedy)
 
 

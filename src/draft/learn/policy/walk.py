@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from draft.errors import DraftError
 from draft.learn.policy.controller import Controller
 from draft.learn.policy.validity import Fit
-from draft.learn.task.config import Config
+from draft.learn.task.groups import Episodes
 from draft.model import Model
 from draft.model.scene import home_position
 from draft.model.swap import swapped
@@ -27,7 +27,7 @@ _ROUNDING = 1e-9  # Share of the peak torque by which torques at a limit may be 
 _BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 _DIVERGED = [int(getattr(mujoco.mjtWarning, name)) for name in _BAD]
 _FLOOR = "floor"
-_FALL = Config().episodes  # Criteria of a fall are those of training.
+_FALL = Episodes()  # Criteria of a fall are those of training.
 
 
 class Walk:

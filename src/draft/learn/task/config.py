@@ -27,8 +27,9 @@ from draft.learn.task.groups import (
     Rewards,
     Velocity,
 )
+from draft.learn.task.stages import STAGES
+from draft.learn.task.terms import defaults
 
-STAGES = ("base", "velocity", "terrain", "push")
 T = TypeVar("T")
 
 
@@ -47,6 +48,20 @@ class Config:
     terrain: Climbing = field(default_factory=Climbing)
     push: Pushing = field(default_factory=Pushing)
     learning: Learning = field(default_factory=Learning)
+    terms: tuple[tuple[str, Any], ...] = field(default_factory=defaults)
+    """Numbers of the terms and stages of extensions, by their names."""
+
+    def groups(self) -> dict[str, Any]:
+        """Return the groups of numbers by name, those of extensions last."""
+        own = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "terms"}
+        return own | dict(self.terms)
+
+    def _replaced(self, name: str, group: Any) -> Config:
+        """Return the configuration with another group of a name."""
+        terms = dict(self.terms)
+        if name not in terms:
+            return replace(self, **{name: group})
+        return replace(self, terms=tuple((terms | {name: group}).items()))
 
     def with_values(self, values: Mapping[str, Any]) -> Config:
         """Return the configuration with some numbers changed.
@@ -59,19 +74,16 @@ class Config:
                 ground has a share.
         """
         config = self
-        known = {
-            f"{g.name}.{f.name}": f for g in fields(self) for f in fields(getattr(self, g.name))
-        }
+        known = {f"{g}.{f.name}": f for g, group in self.groups().items() for f in fields(group)}
         for name, value in values.items():
             group_name, _, key = name.partition(".")
             if name not in known:
                 remedy = suggest(name, known, "numbers")
                 raise DraftError(f"there is no number '{name}'", remedy)
-            group = getattr(config, group_name)
+            group = config.groups()[group_name]
             cast = _cast(name, value, getattr(group, key))
             _check(name, cast, known[name])
-            new = replace(group, **{key: cast})
-            config = replace(config, **{group_name: new})
+            config = config._replaced(group_name, replace(group, **{key: cast}))
         config._check_ground()
         return config
 
@@ -82,9 +94,16 @@ class Config:
                 cause = f"no ground is left: {', '.join(f'{name}.{k}' for k in KINDS)} are all 0"
                 raise DraftError(cause, f"for flat ground: {name}.flat=1")
 
+    def iterations(self, stage: str) -> int:
+        """Return the iterations of a stage."""
+        terms = dict(self.terms)
+        if stage in terms:
+            return terms[stage].iterations
+        return getattr(self.learning, f"iterations_{stage}")
+
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers by group and name, as plain data."""
-        return json.loads(json.dumps(asdict(self)))
+        return json.loads(json.dumps({name: asdict(one) for name, one in self.groups().items()}))
 
     def rows(self, scale: float = 1.0, stage: str | None = None) -> dict[str, list[Row]]:
         """Return the numbers by group, as rows of a table.
@@ -94,25 +113,28 @@ class Config:
             stage: omit the numbers that only other stages use; None for all numbers.
         """
         omitted = [other for other in STAGES if stage is not None and other != stage]
-        groups = {}
-        for group in fields(self):
-            if group.name not in omitted:
-                groups[group.name] = [
-                    row
-                    for row in rows(group.name, getattr(self, group.name), scale)
-                    if row.name not in [f"learning.iterations_{other}" for other in omitted]
-                ]
-        return groups
+        return {
+            name: [
+                row
+                for row in rows(name, group, scale)
+                if row.name not in [f"learning.iterations_{other}" for other in omitted]
+            ]
+            for name, group in self.groups().items()
+            if name not in omitted
+        }
 
 
 def from_dict(data: Mapping[str, Mapping[str, Any]]) -> Config:
     """Return the configuration of the data from `Config.as_dict`.
 
+    It has the terms of extensions that the data has, and no others.
+
     Raises:
         DraftError: there is no such number, or the value is of another type or out of range.
     """
+    terms = tuple((name, numbers) for name, numbers in defaults() if name in data)
     flat = {f"{group}.{name}": v for group, numbers in data.items() for name, v in numbers.items()}
-    return Config().with_values(flat)
+    return Config(terms=terms).with_values(flat)
 
 
 def _cast(name: str, value: Any, like: T) -> T:

@@ -386,7 +386,3 @@ class Learning:
     mirror: bool = choice(
         False, "1", "networks are kept symmetric under the left-right mirror image", DRAFT
     )
-
-    def iterations(self, stage: str) -> int:
-        """Iterations of a stage."""
-        return getattr(self, f"iterations_{stage}")

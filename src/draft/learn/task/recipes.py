@@ -33,12 +33,12 @@ class Recipe:
     Attributes:
         name: its name.
         changes: numbers that differ from `Config()`, by GROUP.NAME.
-        uneven: stages that are trained on uneven ground; the others use a plane.
+        plane: whether stages that do not need uneven ground use a plane.
     """
 
     name: str
     changes: Mapping[str, Change] = field(default_factory=dict)
-    uneven: Sequence[str] = STAGES
+    plane: bool = False
 
     @property
     def config(self) -> Config:
@@ -47,7 +47,7 @@ class Recipe:
 
     def ground(self, stage: str) -> str:
         """Ground of a stage: "uneven" or "flat"."""
-        return "uneven" if stage in self.uneven else "flat"
+        return "uneven" if STAGES[stage].uneven or not self.plane else "flat"
 
     def source(self, name: str) -> str | None:
         """Source of a number that the recipe changes; None for other numbers."""
@@ -95,7 +95,7 @@ LAPTOP = Recipe(
         "terrain.progress": Change(1.0, "a robot that stands keeps all other rewards"),
         "terrain.episode": Change(7.0, "time to leave a patch; rows change sooner"),
     },
-    uneven=("terrain",),
+    plane=True,
 )
 TUNE = Recipe(
     "tune",
@@ -107,7 +107,7 @@ TUNE = Recipe(
         "learning.entropy": Change(0.003, "it need not explore other gaits"),
         "velocity.missed": Change(0.7, "commands grow past what the body can do"),
     },
-    LAPTOP.uneven,
+    LAPTOP.plane,
 )
 RECIPES = {recipe.name: recipe for recipe in (Recipe("paper"), LAPTOP, TUNE)}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from draft.errors import counted
@@ -77,7 +77,7 @@ class Outlook:
 
 
 def outlook(
-    here: Machine, recipe: Recipe, config: Config | None = None, stages: Sequence[str] = STAGES
+    here: Machine, recipe: Recipe, config: Config | None = None, stages: Iterable[str] = STAGES
 ) -> Outlook:
     """Return the training of stages on a machine.
 
@@ -99,7 +99,7 @@ def _training(
     stage: str, config: Config, recipe: Recipe, here: Machine, processes: int | None
 ) -> Training:
     learning, ground = config.learning, recipe.ground(stage)
-    count, took = learning.iterations(stage), None
+    count, took = config.iterations(stage), None
     if here.on_cpu and here.engine is not None and processes is not None:
         steps = count * learning.environments * learning.steps
         took = minutes(steps, config.physics.decimation, here.engine, processes, ground)

@@ -6,16 +6,20 @@ Several processes share a run: one per GPU, or one per core of a CPU.
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
+from draft.errors import DraftError
 from draft.learn.engine.machine import WARP, visible
 from draft.learn.engine.multi_process import Send, asked_to_stop, run_processes
 from draft.learn.engine.stopping import stopping
 from draft.learn.silence import quiet
+from draft.learn.task.terms import TERMS
 from draft.learn.training.progress import Progress
 from draft.learn.training.run import Run, open_run
 from draft.parallel import single_threaded
@@ -57,11 +61,28 @@ def train_slice(
     on_cpu = list(devices) == ["cpu"]
     if len(devices) == 1 and replicas == 1:
         return train_process(run.folder, devices[0], total, until, report, wandb, engine=engine)
-    worker = partial(_worker, run.folder, total, until, wandb, on_cpu, engine)
+    modules = _modules(run)
+    worker = partial(_worker, run.folder, total, until, wandb, on_cpu, engine, modules)
     environment = THREADS if on_cpu else {"CUDA_VISIBLE_DEVICES": ",".join(visible(devices))}
+    if modules:
+        # A script's folder is on the path of its own process alone.
+        environment = {**environment, "PYTHONPATH": os.pathsep.join(sys.path)}
     count = replicas if on_cpu else len(devices)
     logs = run.folder / "torchrunx"
     return run_processes(worker, count, environment, logs, lambda sent: report(Progress(**sent)))
+
+
+def _modules(run: Run) -> tuple[str, ...]:
+    """Modules of the terms of a run, which each of several processes imports.
+
+    Raises:
+        DraftError: a term is of the script that runs, which no process can import.
+    """
+    found = {TERMS[name].function.__module__: name for name, _ in run.plan.config.terms}
+    if "__main__" in found:
+        cause = f"several processes cannot import '{found['__main__']}' from the script that runs"
+        raise DraftError(cause, "move it to a module, or pass `replicas=1`")
+    return tuple(found)
 
 
 def _worker(
@@ -71,11 +92,14 @@ def _worker(
     wandb: str | None,
     on_cpu: bool,
     engine: str,
+    modules: Sequence[str],
     rank: int,
     send: Send,
 ) -> bool:
     """Train in one of several processes; see `train_slice`."""
     quiet()
+    for module in modules:
+        importlib.import_module(module)
     device, replicas = ("cpu", int(os.environ["WORLD_SIZE"])) if on_cpu else (f"cuda:{rank}", 1)
 
     def report(progress: Progress) -> None:

@@ -36,18 +36,20 @@ def register() -> None:
             if task_id in done:
                 continue
             task = Task((member,), stage)
-            config = task.config.learning
             register_mjlab_task(
                 task_id,
-                environment(task, config.environments),
+                environment(task, task.config.learning.environments),
                 environment(task, 1, play=True),
-                agent(config, stage),
+                agent(task.config, stage),
             )
 
 
 def _designs() -> Iterator[tuple[str, LeggedRobot]]:
     for name in shipped():
-        spec = load(name)
+        try:
+            spec = load(name)
+        except DraftError:
+            continue  # One of an extension.
         for design in spec.designs:
             try:
                 yield design, legged_robot(spec.resolve(design))

@@ -3,7 +3,7 @@
 run.json        stage, seed, worlds, numbers, versions, designs, the run that it started from
 members.json    the robots; with the MJCF of each where their texts differ in more than numbers
 members.npz     otherwise, of a family: the MJCF as one template, and the numbers of each robot
-designs/        numbers of each design; `draft build SPEC --design FILE` builds it
+designs/        numbers of each design; `draft build SPEC:FILE` builds it
 model_N.pt      checkpoints: policy, value function, optimiser after N iterations
 resume.pt       state to resume from as if the run had never stopped
 resume.R.N.pt   the same of process R after N iterations, with several processes
@@ -18,11 +18,10 @@ import glob
 import hashlib
 import json
 import re
-import shlex
 import shutil
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -34,6 +33,7 @@ from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.bodies.legged import LeggedRobot, check_family
 from draft.learn.policy.policy import FAMILY
 from draft.learn.task.config import STAGES, Config, from_dict
+from draft.learn.task.terms import TERMS
 from draft.learn.training.members import MEMBERS, files_of, read_members, robots_digest
 from draft.learn.training.progress import PROGRESS, fastest, hardest_row
 from draft.learn.training.reached import Reached
@@ -104,7 +104,7 @@ class Plan:
 
     Attributes:
         members: one quadruped, or several of one topology, in one simulation.
-        stage: one of `draft.learn.task.config.STAGES`.
+        stage: one of `draft.learn.task.stages.STAGES`.
         seed: seed of everything random.
         environments: number of worlds, on each GPU.
         config: the numbers.
@@ -118,7 +118,7 @@ class Plan:
     stage: str = "base"
     seed: int = 0
     environments: int = 4096
-    config: Config = Config()
+    config: Config = field(default_factory=Config)
     ground: str = "uneven"
     see_design: bool = False
     see_ground: bool = True
@@ -229,11 +229,7 @@ class Run:
     def total(self) -> int:
         """Iterations that were last asked for; those of its stage if it has not been trained."""
         value = self._recorded().get("total")
-        return (
-            value
-            if isinstance(value, int)
-            else self.plan.config.learning.iterations(self.plan.stage)
-        )
+        return value if isinstance(value, int) else self.plan.config.iterations(self.plan.stage)
 
     def policy_line(self, iteration: int) -> str:
         """One line on the policy of a checkpoint: its iteration, and whether training is finished.
@@ -245,11 +241,11 @@ class Run:
         text = f"policy: iteration {iteration} of {total}"
         if done >= total:
             return text if iteration >= total else f"{text}, an earlier checkpoint of {self.folder}"
-        command = f"draft train {shlex.quote(str(self.folder))}"
-        if total != self.plan.config.learning.iterations(self.plan.stage):
-            command += f" --iterations {total}"
+        given = json.dumps(str(self.folder), ensure_ascii=False)
+        if total != self.plan.config.iterations(self.plan.stage):
+            given += f", iterations={total}"
         reached = f" from {done}" if done != iteration else ""
-        return f"{text}, unfinished: '{command}' continues the training{reached}"
+        return f"{text}, unfinished: `draft.train({given})` continues the training{reached}"
 
     def _recorded(self) -> State:
         """Content of state.json; nothing if it is missing or cannot be read."""
@@ -278,6 +274,8 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
         DraftError: the folder is not empty, or cannot be written.
     """
     record = {"format": FORMAT, "versions": versions()} | plan.record()
+    terms = {name: TERMS[name].function.__module__ for name, _ in plan.config.terms}
+    record |= {"extensions": terms} if terms else {}
     files: dict[str, str | bytes] = {
         RUN: json.dumps(record, indent=2) + "\n",
         **files_of(plan.members),
@@ -285,11 +283,11 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             cause = f"'{folder}' exists and is not a run of Draft; it is kept"
-            raise DraftError(cause, "choose another --out")
+            raise DraftError(cause, "choose another `out`")
         folder.parent.mkdir(parents=True, exist_ok=True)
         _remove_leftovers(folder)
     except OSError as error:
-        raise cannot_write(folder, error, "choose another --out") from None
+        raise cannot_write(folder, error, "choose another `out`") from None
     with ExitStack() as held, new_folder(folder, replace=False) as temporary:
         # Held until the folder is in place: another process removes leftovers that nobody holds.
         held.enter_context(lock(temporary, "draft train"))
@@ -327,10 +325,14 @@ def open_run(folder: Path) -> Run:
         DraftError: it is not a run, is broken, or was written by another version.
     """
     if not is_run(folder):
-        remedy = "create one with 'draft train DESIGN'"
-        raise DraftError(f"'{folder}' is not a run of 'draft train'", remedy)
+        remedy = "create one with `draft.train(DESIGN)`"
+        raise DraftError(f"'{folder}' is not a run of `draft.train`", remedy)
     try:
         record = json.loads((folder / RUN).read_text(encoding="utf-8"))
+        for name, module in record.get("extensions", {}).items():
+            if name not in TERMS:
+                cause = f"'{folder}' was trained with '{name}' of {module}, which is not loaded"
+                raise DraftError(cause, "install the package that has it, or import it first")
         if record["format"] != FORMAT or record["stage"] not in STAGES:
             cause = f"'{folder}' was written by another version of Draft"
             raise DraftError(cause, "train it again in another folder")
@@ -366,7 +368,7 @@ def check_same(run: Run, plan: Plan) -> None:
     if differing:
         names = ", ".join(name.replace("_", " ") for name in differing[:6])
         cause = f"'{run.folder}' holds a run with another plan: {names} differ"
-        remedy = "choose another --out, or repeat the command that created it"
+        remedy = "choose another `out`, or repeat the command that created it"
         raise DraftError(cause, remedy)
 
 

@@ -17,6 +17,7 @@ from draft.learn.engine.machine import KINDS, NATIVE, Engine
 from draft.learn.policy.policy import open_policy
 from draft.learn.policy.validity import check_policy
 from draft.learn.silence import quiet
+from draft.learn.task.stages import STAGES
 from draft.learn.training.progress import Progress
 from draft.learn.training.run import (
     Origin,
@@ -46,8 +47,8 @@ def begin(
             if the policy that it starts from sees the ground or its design.
         designs: each design's file as YAML, by name, such as "quadruped:cheetah".
         origin: folder of the run whose policy a stage starts from, its ONNX file, or "family" for
-            the policy that ships; "scratch" for none; None for the base run beside the folder
-            unless the stage is `base`. An existing run keeps its own origin if this is None.
+            the policy that ships; "scratch" for none; None for the run beside the folder of the
+            stage that this one starts from. An existing run keeps its own origin if this is None.
 
     Raises:
         DraftError: the folder holds something else, or cannot be written; there is no run to
@@ -57,7 +58,7 @@ def begin(
     for member in plan.members:
         if plan.see_design and not member.is_quadruped:
             cause = f"{member.name} has no features that a policy could see: it is no quadruped"
-            raise DraftError(cause, "omit --see-design")
+            raise DraftError(cause, "omit `see_design`")
     if not is_run(folder):
         return create(folder, _with_origin(folder, plan, origin), dict(designs))
     run = open_run(folder)
@@ -73,16 +74,17 @@ def begin(
 
 def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
     """The plan with the run that it starts from."""
-    if origin == SCRATCH or (origin is None and plan.stage == "base"):
+    before = STAGES[plan.stage].origin
+    if origin == SCRATCH or (origin is None and before is None):
         return replace(plan, origin=None)
-    beside = folder.with_name(folder.name.replace(f"-{plan.stage}-", "-base-"))
+    beside = folder.with_name(folder.name.replace(f"-{plan.stage}-", f"-{before}-"))
     file = policy_file(origin) if origin else None
     if file is not None:
         return _with_exported(plan, str(origin), file)
     source = Path(origin) if origin else beside
     if origin is None and (source == folder or not is_run(source)):
-        cause = f"stage {plan.stage} starts from a base policy, and there is no run {beside}"
-        remedy = "train the base stage first, or pass --from RUN or --from scratch"
+        cause = f"stage {plan.stage} starts from a {before} policy, and there is no run {beside}"
+        remedy = f'train the {before} stage first, or pass `origin=RUN` or `origin="scratch"`'
         raise DraftError(cause, remedy)
     if origin is not None and not is_run(source):
         cause = f"there is no policy '{origin}' to start from"
@@ -92,12 +94,12 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
     if run.plan.see_design:  # Such a policy can continue with any body of the same topology.
         check_family([run.plan.members[0], *plan.members])
     elif plan.see_design:
-        cause = f"{source} was trained without --see-design"
-        raise DraftError(cause, "omit --see-design")
+        cause = f"{source} was trained without `see_design`"
+        raise DraftError(cause, "omit `see_design`")
     elif robots_digest(run.plan.members) != robots_digest(plan.members):
         names = ", ".join(member.name for member in run.plan.members)
         cause = f"{source} is a run of {names}, which differs from the design to be trained"
-        remedy = "name a run of the same design, or one that was trained with --see-design"
+        remedy = "name a run of the same design, or one that was trained with `see_design`"
         raise DraftError(cause, remedy)
     iteration, file = run.checkpoint()
     # A policy that sees the ground keeps seeing it; one that does not may start to.
@@ -118,12 +120,12 @@ def _with_exported(plan: Plan, name: str, file: Path) -> Plan:
     if layers[0] != layers[1]:
         known, own = (", ".join(map(str, units)) for units in layers)
         cause = f"{file} has layers of {known} units, and this training has {own}"
-        remedy = f"--set learning.hidden={known.replace(' ', '')}"
+        remedy = f"`values` learning.hidden={known.replace(' ', '')}"
         raise DraftError(cause, remedy)
     sees_design = bool(len(policy.features))
     if plan.see_design and not sees_design:
-        cause = f"{file} was trained without --see-design"
-        raise DraftError(cause, "omit --see-design")
+        cause = f"{file} was trained without `see_design`"
+        raise DraftError(cause, "omit `see_design`")
     return replace(
         plan,
         origin=Origin(name, policy.iterations, file_digest(file)),
@@ -239,7 +241,7 @@ def origin_line(plan: Plan, beside: Path) -> str | None:
 
 def iterations_of(run: Run, iterations: int | None = None) -> int:
     """Iterations of a run in all slices: the given number, or that of its stage."""
-    return iterations or run.plan.config.learning.iterations(run.plan.stage)
+    return iterations or run.plan.config.iterations(run.plan.stage)
 
 
 def finished(run: Run, iterations: int | None = None) -> bool:

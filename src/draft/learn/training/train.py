@@ -1,7 +1,4 @@
-"""Training of designs by their names and a few arguments, as the command and Python ask for it.
-
-Error messages spell an argument as the option of the command: `--envs` is `envs`.
-"""
+"""Training of designs by their names and a few arguments, as the command and Python ask for it."""
 
 from __future__ import annotations
 
@@ -178,7 +175,7 @@ def prepare(
     folder = Path(out) if out is not None else Path("runs") / _name(plan, given)
     if recipe == TUNE.name and origin in (None, training.SCRATCH) and not is_run(folder):
         cause = "recipe tune is for policies that can run, and there is none to start from"
-        raise DraftError(cause, "add --stage velocity --from family, or --from RUN")
+        raise DraftError(cause, 'add `stage="velocity"` `origin="family"`, or `origin=RUN`')
     # Before anything is written.
     training.check_fits(plan, training.setting(plan, device, engine, replicas))
     return training.begin(folder, plan, texts, origin)
@@ -207,10 +204,10 @@ def _check(
         ("minutes", minutes, 10**6),
     ):
         if value is not None and not 0 < value <= most:
-            cause = f"--{name} {value} is not above 0 and at most {most}"
+            cause = f"`{name}` {value} is not above 0 and at most {most}"
             raise DraftError(cause, "omit it for the default")
     if not 0 <= seed < 2**31:
-        raise DraftError(f"--seed {seed} is not from 0 to 2**31 - 1", "such as 0")
+        raise DraftError(f"`seed` {seed} is not from 0 to 2**31 - 1", "such as 0")
     for what, name, known in (
         ("stage", stage, STAGES),
         ("recipe", recipe, tuple(RECIPES)),
@@ -224,7 +221,7 @@ def _check_worlds(environments: int | None, family: Sequence[LeggedRobot]) -> No
     """Refuse fewer worlds than designs."""
     if environments is not None and environments < len(family):
         cause = f"{counted(environments, 'world')} cannot hold {len(family)} designs"
-        raise DraftError(cause, f"give --envs {len(family)} or more")
+        raise DraftError(cause, f"give `envs={len(family)}` or more")
 
 
 def _name(plan: Plan, designs: Sequence[Design | Spec | str | Path]) -> str:

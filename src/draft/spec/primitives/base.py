@@ -49,6 +49,14 @@ _NUMBER = get_args(Number)[0]  # the annotated type, which is all that pydantic 
 Form = Literal["cylinder", "sphere", "box"]
 Color = tuple[float, float, float, float]
 Fields = TypeVar("Fields", bound=Model)
+# Colours of the kinds of geom that any robot may have.
+COLORS: dict[str, Color] = {
+    "trunk": (0.21, 0.38, 0.56, 1),
+    "structure": (0.86, 0.87, 0.88, 1),
+    "actuator": (0.24, 0.25, 0.28, 1),
+    "foot": (0.16, 0.16, 0.17, 1),
+    "drawn": (0.95, 0.55, 0.20, 1),
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -93,7 +93,7 @@ def _old(target: Path) -> Study | None:
         return files.read(target)
     if not target.is_dir() or any(target.iterdir()):
         cause = f"'{target}' exists and does not hold results of a study; it is kept"
-        raise DraftError(cause, "choose another --out")
+        raise DraftError(cause, "choose another `out`")
     return None
 
 
@@ -142,7 +142,7 @@ def _merged(old: Study, new: Study) -> Study:
         run, kept = runs[one.run.name], (one.run.name, one.name)
         if kept not in evaluations and _same_training(before[run.name], run):
             evaluations[kept] = replace(one, run=run)
-    singles = sorted(runs.values(), key=lambda r: (r.key[0], STAGES.index(r.stage), r.seed))
+    singles = sorted(runs.values(), key=lambda r: (r.key[0], list(STAGES).index(r.stage), r.seed))
     ordered = [evaluations[key] for key in sorted(evaluations)]
     planned = _joined(old.planned, new.planned)
     return replace(
@@ -199,7 +199,7 @@ def _check_alike(study: Study, target: Path) -> None:
             what = ", ".join(name.replace("_", " ") for name in dict.fromkeys(differing[:6]))
             other = namesake if differing == ["robot"] else first
             cause = f"run {one.name} is of another plan than {other.name} of '{target}': {what}"
-            remedy = "choose another --out, or delete the folder and collect anew"
+            remedy = "choose another `out`, or delete the folder and collect anew"
             raise DraftError(f"{cause} differ; nothing was written", remedy)
 
 

@@ -11,7 +11,7 @@ The same records give the same bytes, and each curve is on one line, so that dif
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
@@ -25,6 +25,7 @@ from draft.learn.measuring.utilisation import BINS, CELLS
 from draft.learn.task.config import STAGES
 from draft.learn.training.members import robots_digest
 from draft.learn.training.run import is_run, safe
+from draft.study.file import StageName
 from draft.study.report.records import Evaluation, Planned, Samples, Study, Trained
 from draft.values import Array
 
@@ -111,7 +112,7 @@ class RunFile(_File):
     format: Literal[1]
     run: str
     design: str
-    stage: Literal["base", "velocity", "terrain", "push"]
+    stage: StageName
     seed: int
     robots: str
     planned: int = Field(ge=0)
@@ -223,6 +224,11 @@ def is_results(folder: Path) -> bool:
     return (folder / STUDY).is_file()
 
 
+def study_command(words: Sequence[str]) -> str:
+    """Return the line of a terminal that runs `draft study`."""
+    return f"draft study {' '.join(words)}"
+
+
 def read(folder: Path) -> Study:
     """Read a results folder.
 
@@ -232,7 +238,7 @@ def read(folder: Path) -> Study:
     """
     if any(map(is_run, (folder / RUNS).glob("*"))):
         cause = f"'{folder}' is the folder of a study, whose results are not collected yet"
-        raise DraftError(cause, f"draft study collect {folder} --out DIR")
+        raise DraftError(cause, study_command(["collect", str(folder), "--out", "DIR"]))
     if not is_results(folder):
         remedy = "name a folder that 'draft study collect' wrote"
         raise DraftError(f"'{folder}' holds no results of a study", remedy)
@@ -247,7 +253,7 @@ def read(folder: Path) -> Study:
         evaluations += [_evaluation(path, run, name, e) for name, e in file.evaluations.items()]
     if not runs:
         raise _broken(folder / RUNS, "no run is in it")
-    runs.sort(key=lambda one: (one.key[0], STAGES.index(one.stage), one.seed))
+    runs.sort(key=lambda one: (one.key[0], list(STAGES).index(one.stage), one.seed))
     return Study(study.name, tuple(runs), (), tuple(evaluations), (), study.planned)
 
 

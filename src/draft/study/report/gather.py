@@ -91,7 +91,7 @@ def _trained(run: Run, planned: Planned | None) -> Trained:
         name=run.folder.name,
         members=run.plan.members,
         plan=plan,
-        planned=asked or run.plan.config.learning.iterations(run.plan.stage),
+        planned=asked or run.plan.config.iterations(run.plan.stage),
         iterations=run.done(),
         seconds=run.seconds() or None,
         engine=run.engine(),

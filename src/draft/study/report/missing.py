@@ -7,6 +7,7 @@ from itertools import product
 
 from draft.learn.measuring.summary import ARMS
 from draft.learn.task.config import STAGES
+from draft.learn.task.stages import PUBLISHED
 from draft.study.report.records import Study, Trained, seeds_in_words
 
 
@@ -17,7 +18,7 @@ def missing(study: Study) -> list[str]:
     any of them has.
     """
     plan = study.planned
-    stages = plan.stages if plan else STAGES
+    stages = plan.stages if plan else [stage.name for stage in PUBLISHED]
     seeds = sorted({*study.seeds, *(plan.seeds if plan else ())})
     designs = study.titles
     found: list[str] = []

@@ -24,7 +24,7 @@ def training(study: Study) -> Table:
         groups.setdefault((study.title(one), one.stage), []).append(one)
     order = list(dict.fromkeys([*study.titles.values(), *(name for name, _ in groups)]))
     rows: list[list[Cell]] = []
-    for name, stage in sorted(groups, key=lambda g: (order.index(g[0]), STAGES.index(g[1]))):
+    for name, stage in sorted(groups, key=lambda g: (order.index(g[0]), list(STAGES).index(g[1]))):
         runs = groups[name, stage]
         asked = {one.planned for one in runs}
         hours = [one.seconds / 3600 for one in runs if one.seconds is not None]
@@ -74,7 +74,10 @@ def evaluations(study: Study) -> Table | None:
         return None
     order = list(study.titles.values())
     rows.sort(
-        key=lambda r: (order.index(str(r[0])) if r[0] in order else 99, STAGES.index(str(r[1])))
+        key=lambda r: (
+            order.index(str(r[0])) if r[0] in order else 99,
+            list(STAGES).index(str(r[1])),
+        )
     )
     titles = ("design", "stage", "evaluations", "protocol", "batteries", "replicas")
     columns = [Column(title) for title in titles]

@@ -23,6 +23,7 @@ from draft.study.report.blocks import (
     Pictures,
     Section,
 )
+from draft.study.report.collected import study_command
 from draft.study.report.learning import lines
 from draft.study.report.missing import missing
 from draft.study.report.records import Study, seeds_in_words
@@ -32,6 +33,7 @@ from draft.study.report.table import Table
 from draft.study.report.tables import of_skill
 
 STRIPS = "strips"
+_SURFACE = ["draft surface", "ROBOT", "--policy", "RUN"]  # its command line
 # Name of a policy by its stage, as in the file names of strips.
 WORDS = {stage: skill for skill, stage in policy.SKILLS.items()}
 TOY = "This is the toy of a study: it shows that all of it runs, and nothing about the designs."
@@ -70,9 +72,9 @@ class Source:
         """Return the command that writes the page."""
         page = os.path.relpath(self.page)
         named = self.page.name if page.startswith("..") else Path(page).as_posix()
-        others = " ".join(map(_place, self.beside))
-        against = f" --against {others}" if others else ""
-        return f"draft study results {_place(self.folder)}{against} --write {named}"
+        others = [*map(_place, self.beside)]
+        against = ["--against", *others] if others else []
+        return study_command(["results", _place(self.folder), *against, "--write", named])
 
 
 class Contents:
@@ -227,8 +229,7 @@ class Contents:
         if self.study.families:
             runs = ", ".join(one.name for one in self.study.families)
             yield Paragraph(
-                f"Runs of families: {runs}. Their figures are those of "
-                "`draft surface ROBOT --policy RUN`."
+                f"Runs of families: {runs}. Their figures are those of `{' '.join(_SURFACE)}`."
             )
 
     def _utilisation(self) -> Iterator[Block]:
@@ -279,10 +280,11 @@ class Contents:
         if self.source:
             study, planned, place = self.study, self.study.planned, _place(self.source.folder)
             file = self.source.folder / f"{study.name}.yaml"
-            toy = " --toy" * bool(planned and planned.toy)
+            toy = ["--toy"] if planned and planned.toy else []
             made = f"studies/{study.name}{'-toy' * bool(toy)}"
-            first = f"draft study {place}/{file.name}{toy}   # to {made}, in slices if need be"
-            collect = f"draft study collect {made} --out {place}"
+            first = study_command([f"{place}/{file.name}", *toy])
+            first += f"   # to {made}, in slices if need be"
+            collect = study_command(["collect", made, "--out", place])
             yield Commands([*[first] * file.is_file(), collect, self.source.command()])
             whose = "; ".join(errors.WORDS[source] for source in errors.sources(study))
             whose = f" Inertia errors: {whose}." if whose else ""

@@ -95,7 +95,7 @@ def _check_target(target: Path) -> None:
     inside = {path.name for path in target.iterdir()} if target.is_dir() else {""}
     if inside - PARTS or (inside and PAGE not in inside):
         cause = f"'{target}' exists and is not a report of Draft; it is kept"
-        raise DraftError(cause, "choose another --out")
+        raise DraftError(cause, "choose another `out`")
 
 
 def write_page(
@@ -122,7 +122,7 @@ def write_page(
     images = page.parent / "images" / page.stem
     drawings = [*figures.combined(study, used)]
     # The folder is replaced, so that figures that are no longer drawn go.
-    with new_folder(images, "choose another --write") as new:
+    with new_folder(images, "choose another `write`") as new:
         found = save(new, {one.name: one.make for one in drawings}, SMALL, ("png",))
         for path in found:
             figures.shrink(path)

@@ -341,12 +341,12 @@ def test_a_reward_without_its_numbers_or_with_a_used_name_is_refused() -> None:
         rewards.reward("still")(height)
     with pytest.raises(ValueError, match="has no number 'still_limit'"):
         rewards.reward("still", weight="height_weight", limit="still_limit")(height)
-    assert "still" not in rewards.TERMS
-    assert rewards.TERMS["height"].func is rewards.height
+    assert "still" not in rewards.REWARDS
+    assert rewards.REWARDS["height"].func is rewards.height
 
 
 def test_numbers_of_a_reward_are_those_of_the_configuration() -> None:
     numbers = Rewards(height_weight=0.7, height=0.5)
-    term = rewards.TERMS["height"].cfg(numbers)
+    term = rewards.REWARDS["height"].cfg(numbers)
     assert (term.func, term.weight) == (rewards.height, 0.7)
     assert term.params == {"target": Scaled(0.5, 1.0), "sigma": Scaled(0.11, 1.0)}

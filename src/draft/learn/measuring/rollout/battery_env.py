@@ -29,7 +29,7 @@ from draft.learn.measuring.rollout.trial import Layout, Trial, layout
 from draft.learn.task.groups import Ground
 from draft.learn.task.mdp import events
 from draft.learn.task.mdp.commands import command_term
-from draft.learn.task.mdp.environment import environment
+from draft.learn.task.mdp.environment import FALLS, environment
 
 COLUMNS = {"descent": "stairs", "ascent": "stairs_pit"}
 
@@ -70,7 +70,7 @@ def env_cfg(trial: Trial, batteries: Sequence[Battery], rows: Layout) -> Manager
     cfg.episode_length_s = 1e9
     cfg.rewards, cfg.curriculum, cfg.metrics = {}, {}, dict(EACH_STEP)
     cfg.observations = {"actor": cfg.observations["actor"]}
-    cfg.terminations = {name: cfg.terminations[name] for name in ("tilted", "low")}
+    cfg.terminations = {name: cfg.terminations[name] for name in FALLS}
     # A world whose state is not finite counts as fallen.
     cfg.terminations["broken"] = TerminationTermCfg(func=envs_mdp.nan_detection)
     cfg.events = _events(trial, cfg, rows)
@@ -93,7 +93,7 @@ _STAIRS = {
 
 def _events(trial: Trial, cfg: ManagerBasedRlEnvCfg, rows: Layout) -> dict[str, EventTermCfg]:
     """Events of training without pushes: the designs first, then the extra ones."""
-    terms = {name: term for name, term in cfg.events.items() if name != "push"}
+    terms = {n: term for n, term in cfg.events.items() if term.mode in ("startup", "reset")}
     first = {name: terms.pop(name) for name in ("designs",) if name in terms}
     dt = cfg.sim.mujoco.timestep * cfg.decimation
     if rows.kick.any():

@@ -80,7 +80,7 @@ def trained(run: Run, iteration: int, device: str) -> Callable[[ManagerBasedRlEn
 
     def make_policy(env: ManagerBasedRlEnv) -> Policy:
         seen = TensorDict(dict(env.get_observations()), batch_size=[env.num_envs])
-        numbers = agent_settings(run.plan.config.learning, run.plan.stage)["actor"]
+        numbers = agent_settings(run.plan.config, run.plan.stage)["actor"]
         names = ("hidden_dims", "activation", "obs_normalization", "distribution_cfg")
         shape = {name: numbers[name] for name in names}
         actions = env.action_manager.total_action_dim
@@ -180,7 +180,7 @@ def _simulate(
         ):
             raise
         cause = f"{len(rows.level)} worlds do not fit into the memory of {device}: {text}"
-        remedy = "use fewer --replicas, fewer --levels, or one --battery at a time"
+        remedy = "use fewer `replicas`, fewer `levels`, or one `battery` at a time"
         raise DraftError(cause, remedy) from None
     kept = {name: getattr(rows, name) for name in ("battery", "level", "member", "replica", "kept")}
     # The first replica of each level and member gives the labels of its group.

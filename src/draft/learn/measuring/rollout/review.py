@@ -14,6 +14,7 @@ from draft.learn.measuring.rollout.evaluate import Policy, evaluate, exported, t
 from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.policy.policy import open_policy
 from draft.learn.task.constants import scaled
+from draft.learn.task.stages import is_like
 from draft.learn.training.ppo.trainer import task_of
 from draft.learn.training.progress import PROGRESS
 from draft.learn.training.progress import fastest as fastest_commanded
@@ -100,9 +101,9 @@ def _origin(run: Run, device: str) -> Maker | None:
 def _trial(run: Run, replicas: int) -> Trial:
     """Settings of the review of a run."""
     chosen = [replace(BATTERIES[SPEED], levels=speeds(run))]
-    if run.plan.stage == "terrain":
+    if is_like(run.plan.stage, "terrain"):
         chosen += [replace(BATTERIES[name], levels=STEPS) for name in (ASCENT, DESCENT)]
-    if run.plan.stage == "push":
+    if is_like(run.plan.stage, "push"):
         chosen += [replace(BATTERIES[PUSH], levels=KICKS)]
     task = task_of(run.plan)
     # Draws fill the region evenly from the first on.
@@ -148,6 +149,6 @@ def speeds(run: Run) -> tuple[float, ...]:
     slowest = min(plan.members, key=lambda member: member.top_speed)
     c = plan.config.commands
     fastest = min(scaled(c, "forward").at(slowest.scale), c.limit * slowest.top_speed)
-    if plan.stage == "velocity":
+    if is_like(plan.stage, "velocity"):
         fastest = max(fastest, fastest_commanded(run.folder / PROGRESS) or 0.0)
     return tuple(round(fastest * share, 2) for share in (0.25, 0.5, 0.75, 1.0))

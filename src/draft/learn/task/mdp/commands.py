@@ -95,6 +95,14 @@ class VelocityCommandCfg(UniformVelocityCommandCfg):
     away: Away | None = None
     pushed: Pushed | None = None
 
+    def set_largest(self, forward: Scaled, sideways: Scaled, turn: Scaled, task: Task) -> None:
+        """Set the largest |vx|, |vy| [m/s] and |wz| [rad/s], also of mjlab's sliders."""
+        self.forward, self.sideways, self.turn = forward, sideways, turn
+        scale = task.members[0].scale
+        x, y, z = (number.at(scale) for number in (forward, sideways, turn))
+        ranges = self.ranges
+        ranges.lin_vel_x, ranges.lin_vel_y, ranges.ang_vel_z = (-x, x), (-y, y), (-z, z)
+
     def build(self, env: ManagerBasedRlEnv) -> VelocityCommand:
         """Build the term."""
         return VelocityCommand(self, env)
@@ -285,38 +293,9 @@ def command_term(env: ManagerBasedRlEnv) -> VelocityCommand:
 
 
 def command_cfg(task: Task) -> VelocityCommandCfg:
-    """Configuration of the velocity commands of a stage."""
-    config = task.config
-    c, steps = config.commands, config.learning.steps
-    forward, sideways, turn = (scaled(c, name) for name in ("forward", "sideways", "turn"))
-    limit: float | None = c.limit
-    ramp: Ramp = ((0, 1.0),)
-    grow: Growth | None = None
-    away: Away | None = None
-    p = config.push
-    slow = tuple(Scaled(value) for value in (p.forward, p.sideways, p.turn))
-    pushed: Pushed | None = None
-    if task.stage == "velocity":
-        v = config.velocity
-        growth, start = scaled(v, "growth"), forward
-        forward, sideways, turn = Scaled(v.forward), Scaled(v.sideways), Scaled(v.turn)
-        limit, ramp = None, v.ramp
-        if v.growth:
-            ramp = ((0, 1.0),)
-            grow = Growth(start, growth, v.tracked, v.missed)
-        if v.pushed:
-            pushed = Pushed(v.pushed, *slow)
-    elif task.stage == "push":
-        forward, sideways, turn = slow
-        limit = None
-    elif task.stage == "terrain":
-        limit = config.terrain.limit
-        if config.terrain.forward[1]:
-            low, high = config.terrain.forward
-            away = Away(Scaled(low, 0.5), Scaled(high, 0.5), config.terrain.away)
-    scale = task.members[0].scale
-    ends = [number.at(scale) for number in (forward, sideways, turn)]
-    return VelocityCommandCfg(
+    """Configuration of the velocity commands that all stages share."""
+    c = task.config.commands
+    cfg = VelocityCommandCfg(
         entity_name="robot",
         resampling_time_range=c.interval,
         rel_standing_envs=c.standing,
@@ -325,21 +304,11 @@ def command_cfg(task: Task) -> VelocityCommandCfg:
         heading_command=True,
         heading_control_stiffness=c.heading_stiffness,
         debug_vis=True,
-        ranges=VelocityCommandCfg.Ranges(
-            lin_vel_x=(-ends[0], ends[0]),
-            lin_vel_y=(-ends[1], ends[1]),
-            ang_vel_z=(-ends[2], ends[2]),
-            heading=(-3.14159, 3.14159),
-        ),
-        forward=forward,
-        sideways=sideways,
-        turn=turn,
+        ranges=VelocityCommandCfg.Ranges((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (-3.14159, 3.14159)),
         forward_least=c.forward_least,
-        limit=limit,
+        limit=c.limit,
         limit_sideways=c.limit_sideways,
-        ramp=ramp,
-        growth=grow,
-        away=away,
-        pushed=pushed,
-        steps=steps,
+        steps=task.config.learning.steps,
     )
+    cfg.set_largest(scaled(c, "forward"), scaled(c, "sideways"), scaled(c, "turn"), task)
+    return cfg

@@ -1,15 +1,17 @@
-"""Environments of the four stages, for one quadruped or for several of one topology.
+"""Environments of the stages, for one quadruped or for several of one topology.
 
-Stage `base` walks on gently uneven ground at a commanded velocity, with pushes. The other stages
-start from its policy, and each raises one thing: the commanded speed, the height of the ground, or
-the size of the pushes. Numbers and their sources are in `draft.learn.task.config`.
+Robots walk on gently uneven ground at a commanded velocity, with pushes; `stages` has what each
+stage changes. Numbers and their sources are in `draft.learn.task.config`.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 from mjlab.envs import ManagerBasedRlEnvCfg
 from mjlab.envs.mdp.actions import JointPositionActionCfg
-from mjlab.managers.curriculum_manager import CurriculumTermCfg
+from mjlab.managers.event_manager import EventTermCfg
+from mjlab.managers.reward_manager import RewardTermCfg
 from mjlab.managers.termination_manager import TerminationTermCfg
 from mjlab.scene import SceneCfg
 from mjlab.sensor import ContactMatch, ContactSensorCfg, SensorCfg
@@ -18,17 +20,24 @@ from mjlab.tasks.velocity import mdp as velocity_mdp
 from mjlab.terrains import TerrainEntityCfg
 from mjlab.viewer import ViewerConfig
 
-from draft.learn.task.config import STAGES
-from draft.learn.task.constants import Scaled, scaled
-from draft.learn.task.mdp import curriculums, terminations
+from draft.errors import DraftError
+from draft.learn.task.config import Config
+from draft.learn.task.constants import scaled
+from draft.learn.task.mdp import terminations
 from draft.learn.task.mdp.commands import command_cfg
 from draft.learn.task.mdp.events import event_cfgs
 from draft.learn.task.mdp.observations import observation_cfgs
 from draft.learn.task.mdp.rewards import reward_cfgs
+from draft.learn.task.stages import STAGES
+from draft.learn.task.terms import TERMS, arguments
 from draft.learn.task.world.access import COMMAND, FEET, GROUND, THIGHS
 from draft.learn.task.world.ground import HeightMapCfg, uneven
 from draft.learn.task.world.robot import robot
 from draft.learn.task.world.task import Task
+
+FALLS = ("tilted", "low")  # Terminations of a robot that fell.
+# Events that remain when a policy is watched: no errors of the robots, no pushes.
+WATCHED = ("designs", "reset_base", "reset_joints")
 
 
 def environment(
@@ -50,11 +59,9 @@ def environment(
         raise ValueError(f"no stage '{task.stage}'; stages: {', '.join(STAGES)}")
     config, first = task.config, task.members[0]
     physics = config.physics
-    longest = max(_length(task).at(m.scale) for m in task.members)
     terrain = _terrain(task)
-    return ManagerBasedRlEnvCfg(
+    cfg = ManagerBasedRlEnvCfg(
         decimation=physics.decimation,
-        episode_length_s=1e9 if play else longest,
         seed=task.seed,
         scene=SceneCfg(
             num_envs=environments,
@@ -73,10 +80,10 @@ def environment(
             )
         },
         commands={COMMAND: command_cfg(task)},
-        events=event_cfgs(task, play),
+        events=event_cfgs(task),
         rewards=reward_cfgs(task),
-        terminations=_terminations(task, play),
-        curriculum={} if play else _curriculum(task),
+        terminations=_terminations(task),
+        curriculum={},
         viewer=ViewerConfig(
             origin_type=ViewerConfig.OriginType.ASSET_BODY,
             entity_name="robot",
@@ -96,20 +103,22 @@ def environment(
             ),
         ),
     )
-
-
-def _length(task: Task) -> Scaled:
-    """Length of an episode [s]."""
-    if task.stage == "terrain" and task.config.terrain.episode:
-        return scaled(task.config.terrain, "episode")
-    return scaled(task.config.episodes, "length")
+    _add_terms(cfg, config)
+    STAGES[task.stage].apply(cfg, task)
+    length = cfg.terminations["time_out"].params["length"]
+    cfg.episode_length_s = max(length.at(m.scale) for m in task.members)
+    if play:
+        cfg.episode_length_s, cfg.curriculum = 1e9, {}
+        cfg.events = {name: term for name, term in cfg.events.items() if name in WATCHED}
+        cfg.terminations = {name: cfg.terminations[name] for name in FALLS}
+    return cfg
 
 
 def _terrain(task: Task) -> TerrainEntityCfg:
     if task.ground == "flat":
         return TerrainEntityCfg(terrain_type="plane")
     radius = max(member.foot_radius for member in task.members)
-    return uneven(task.config, task.stage, radius, task.seed)
+    return uneven(task.config, STAGES[task.stage].shares, radius, task.seed)
 
 
 def _sensors(task: Task, terrain: TerrainEntityCfg) -> tuple[SensorCfg, ...]:
@@ -154,39 +163,41 @@ def _sensors(task: Task, terrain: TerrainEntityCfg) -> tuple[SensorCfg, ...]:
     )
 
 
-def _terminations(task: Task, play: bool) -> dict[str, TerminationTermCfg]:
+def _add_terms(cfg: ManagerBasedRlEnvCfg, config: Config) -> None:
+    """Add the terms of extensions.
+
+    Raises:
+        DraftError: Draft has a term of this name.
+    """
+    for name, numbers in config.terms:
+        term, params = TERMS[name], arguments(numbers)
+        if term.kind == "stage":
+            continue
+        terms: dict[str, Any] = getattr(cfg, f"{term.kind}s")
+        if name in terms:
+            cause = f"{term.function.__module__}: there is a {term.kind} '{name}' already"
+            raise DraftError(cause, f"rename the {term.kind}")
+        options = {**term.options, "func": term.function, "params": params}
+        if term.kind == "reward":
+            terms[name] = RewardTermCfg(weight=numbers.weight, **options)
+        elif term.kind == "termination":
+            terms[name] = TerminationTermCfg(**options)
+        else:
+            interval = getattr(numbers, "interval", None)
+            terms[name] = EventTermCfg(interval_range_s=interval, **options)
+
+
+def _terminations(task: Task) -> dict[str, TerminationTermCfg]:
     e = task.config.episodes
     terms = {
         "tilted": TerminationTermCfg(func=terminations.tilted, params={"limit": e.tilt}),
         "low": TerminationTermCfg(func=terminations.low, params={"share": e.low}),
     }
-    if play:
-        return terms
     terms["time_out"] = TerminationTermCfg(
-        func=terminations.time_out, time_out=True, params={"length": _length(task)}
+        func=terminations.time_out, time_out=True, params={"length": scaled(e, "length")}
     )
     if task.ground == "uneven":
-        # A robot that runs away from hard ground has not mastered it.
         terms["left_ground"] = TerminationTermCfg(
-            func=velocity_mdp.out_of_terrain_bounds,
-            time_out=task.stage != "terrain",
-            params={"margin": e.margin},
+            func=velocity_mdp.out_of_terrain_bounds, time_out=True, params={"margin": e.margin}
         )
     return terms
-
-
-def _curriculum(task: Task) -> dict[str, CurriculumTermCfg]:
-    config, steps = task.config, task.config.learning.steps
-    if task.stage == "velocity":
-        if config.velocity.growth:
-            return {"fastest": CurriculumTermCfg(func=curriculums.fastest)}
-        params = {"ramp": config.velocity.ramp, "steps": steps}
-        return {"speed_share": CurriculumTermCfg(func=curriculums.logged, params=params)}
-    if task.stage == "push":
-        params = {"ramp": config.push.ramp, "steps": steps}
-        return {"push_factor": CurriculumTermCfg(func=curriculums.logged, params=params)}
-    if task.stage == "terrain" and task.ground == "uneven":
-        t = config.terrain
-        params = {"promotion": t.promotion, "demotion": t.demotion, "by_way": t.by_way}
-        return {"row": CurriculumTermCfg(func=curriculums.rows, params=params)}
-    return {}

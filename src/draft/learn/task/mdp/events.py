@@ -15,6 +15,7 @@ from mjlab.utils.lab_api.math import quat_apply_inverse
 
 from draft.learn.bodies import inertia
 from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.task.config import Config
 from draft.learn.task.constants import Scaled, ramp_at, scaled
 from draft.learn.task.groups import Episodes, Pushing, Ramp
 from draft.learn.task.mdp.commands import share_of_worlds
@@ -223,18 +224,13 @@ class PushParams(TypedDict):
     steps: int
 
 
-def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:
-    """Configurations of the events of a stage, by name, in order: designs first.
-
-    Args:
-        task: the task.
-        play: whether the environment is for watching: no errors of the robots, no pushes.
-    """
+def event_cfgs(task: Task) -> dict[str, EventTermCfg]:
+    """Configurations of the events that all stages share, by name, in order: designs first."""
     e, first = task.config.episodes, task.members[0]
     terms = {}
     if len(task.members) > 1:
         terms["designs"] = EventTermCfg(func=assume_designs, mode="startup")
-    terms |= {
+    return terms | {
         "reset_base": EventTermCfg(
             func=envs_mdp.reset_root_state_uniform,
             mode="reset",
@@ -253,10 +249,6 @@ def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:
             mode="reset",
             params={"position_range": (-e.joints, e.joints), "velocity_range": (0.0, 0.0)},
         ),
-    }
-    if play:
-        return terms
-    return terms | {
         "foot_friction": EventTermCfg(
             func=envs_mdp.dr.geom_friction,
             mode="startup",
@@ -283,15 +275,17 @@ def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:
 
 
 def _pushes(task: Task) -> PushParams:
-    """Parameters of the pushes of a stage."""
-    e, p = task.config.episodes, task.config.push
+    """Parameters of the pushes that all stages share."""
+    e = task.config.episodes
     most = (*_each(e, "push_linear"), *_each(e, "push_angular"))
     usual = Kind(most, _each(e, "push_interval"), ((0, 1.0),))
-    most = tuple(map(Scaled, (*p.linear, *p.angular)))
-    strong = Kind(most, _each(p, "interval"), p.ramp)
-    share = task.config.velocity.pushed if task.stage == "velocity" else 0.0
-    kinds = (strong,) if task.stage == "push" else (usual, strong) if share else (usual,)
-    return {"kinds": kinds, "share": share, "steps": task.config.learning.steps}
+    return {"kinds": (usual,), "share": 0.0, "steps": task.config.learning.steps}
+
+
+def strong_pushes(config: Config) -> Kind:
+    """Pushes of the same size for every design, which grow."""
+    p = config.push
+    return Kind(tuple(map(Scaled, (*p.linear, *p.angular))), _each(p, "interval"), p.ramp)
 
 
 def _each(group: Episodes | Pushing, name: str) -> tuple[Scaled, ...]:

@@ -1,8 +1,8 @@
 """Reward terms of arXiv 2609.38405 that mjlab lacks; each returns values of shape (worlds,).
 
 `@reward` makes a function a term of all stages, with its numbers in `config.Rewards`;
-`reward_cfgs` has what a stage changes. A number that scales with the leg is a `Scaled`, evaluated
-at the scale of each world's design.
+`draft.learn.task.stages` has what a stage changes. A number that scales with the leg is a `Scaled`,
+evaluated at the scale of each world's design.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.reward_manager import RewardTermCfg
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
-from draft.learn.task.config import Config
 from draft.learn.task.constants import Scaled, scaled
 from draft.learn.task.groups import Rewards
 from draft.learn.task.mdp.commands import command_term
@@ -58,7 +57,7 @@ class Term:
         return RewardTermCfg(func=self.func, weight=getattr(numbers, self.weight), params=params)
 
 
-TERMS: dict[str, Term] = {}
+REWARDS: dict[str, Term] = {}
 
 
 def reward(name: str = "", *, weight: str = "", **params: str) -> Callable[[F], F]:
@@ -76,14 +75,14 @@ def reward(name: str = "", *, weight: str = "", **params: str) -> Callable[[F], 
     def register(function: F) -> F:
         term_name = name or function.__name__
         term = Term(function, weight or f"{term_name}_weight", params)
-        if term_name in TERMS:
+        if term_name in REWARDS:
             raise ValueError(f"there is a reward '{term_name}' already: rename one")
         known = {field.name for field in fields(Rewards)}
         missing = [field for field in (term.weight, *params.values()) if field not in known]
         if missing:
             cause = f"reward '{term_name}': config.Rewards has no number '{missing[0]}'"
             raise ValueError(f"{cause}: add its line there")
-        TERMS[term_name] = term
+        REWARDS[term_name] = term
         return function
 
     return register
@@ -243,46 +242,8 @@ def _tracked(env: ManagerBasedRlEnv, width: torch.Tensor) -> torch.Tensor:
 
 
 def reward_cfgs(task: Task) -> dict[str, RewardTermCfg]:
-    """Configurations of the reward terms of a stage, by name."""
+    """Configurations of the reward terms that all stages share, by name."""
     config = task.config
-    terms = {name: term.cfg(config.rewards) for name, term in TERMS.items()}
-    terms["action_rate"].params = {
-        "ramp": config.rewards.action_rate_ramp if task.stage == "base" else 0,
-        "steps": config.learning.steps,
-    }
-    if task.stage == "push":
-        terms["linear_velocity"].params = {"sigma": Scaled(config.push.sigma)}
-    elif task.stage == "terrain" and config.terrain.progress:
-        terms["progress"] = RewardTermCfg(
-            func=progress,
-            weight=config.terrain.progress,
-            params={"gate": scaled(config.rewards, "clearance_gate")},
-        )
-    elif task.stage == "velocity":
-        _reward_speed(config, terms)
+    terms = {name: term.cfg(config.rewards) for name, term in REWARDS.items()}
+    terms["action_rate"].params = {"ramp": 0, "steps": config.learning.steps}
     return terms
-
-
-def _reward_speed(config: Config, terms: dict[str, RewardTermCfg]) -> None:
-    """Change the terms that differ in stage `velocity`."""
-    v, gate = config.velocity, terms["air_time"].params["gate"]
-    if v.relative:
-        terms["linear_velocity"].func = track_relative
-        terms["linear_velocity"].params["share"] = v.relative
-    else:
-        terms["linear_velocity"] = RewardTermCfg(
-            func=track_capped,
-            weight=config.rewards.linear_weight,
-            params={"headroom": v.headroom, "share": v.sigma},
-        )
-    terms["air_time"] = RewardTermCfg(
-        func=air_time,
-        weight=v.air_time_weight,
-        params={"most": Scaled(v.air_time_most), "gate": gate},
-    )
-    terms["action_rate"].weight = v.action_rate_weight
-    terms["speed"] = RewardTermCfg(
-        func=speed,
-        weight=v.speed_weight,
-        params={"headroom": v.headroom, "gate": v.speed_gate},
-    )

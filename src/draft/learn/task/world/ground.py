@@ -7,7 +7,7 @@ that of downward rays that hit the ground only, never the robot's own legs.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 import mujoco
 import numpy as np
@@ -92,18 +92,20 @@ class SlabStairsCfg(BoxPyramidStairsTerrainCfg):
         )
 
 
-def uneven(config: Config, stage: str, foot_radius: float, seed: int) -> TerrainEntityCfg:
-    """Configuration of the uneven ground of a stage.
+def uneven(
+    config: Config, shares: Literal["ground", "terrain"], foot_radius: float, seed: int
+) -> TerrainEntityCfg:
+    """Configuration of uneven ground.
 
     Args:
         config: the numbers.
-        stage: one of `draft.learn.task.config.STAGES`.
+        shares: group of numbers with the shares of the kinds of ground.
         foot_radius: radius of the largest foot [m]; cells of height fields have at least twice
             this side.
         seed: seed of the random patches.
     """
     ground = config.ground
-    mix: Ground | Climbing = config.terrain if stage == "terrain" else ground
+    mix: Ground | Climbing = config.terrain if shares == "terrain" else ground
     generator = TerrainGeneratorCfg(
         seed=seed,
         curriculum=True,

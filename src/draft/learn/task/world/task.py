@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from draft.learn.bodies.legged import LeggedRobot
@@ -17,7 +17,7 @@ class Task:
 
     Attributes:
         members: one quadruped, or several of one topology.
-        stage: one of `draft.learn.task.config.STAGES`.
+        stage: one of `draft.learn.task.stages.STAGES`.
         config: the numbers.
         ground: "uneven", or "flat" for a plane.
         see_design: whether the policy observes the features of its design.
@@ -27,7 +27,7 @@ class Task:
 
     members: tuple[LeggedRobot, ...]
     stage: str = "base"
-    config: Config = Config()
+    config: Config = field(default_factory=Config)
     ground: GroundKind = "uneven"
     see_design: bool = False
     see_ground: bool = True

@@ -14,7 +14,7 @@ from mjlab.rl import (
 )
 from torch import distributed
 
-from draft.learn.task.groups import Learning
+from draft.learn.task.config import Config
 
 
 @dataclass
@@ -47,14 +47,15 @@ class Runner(MjlabOnPolicyRunner):
             distributed.init_process_group("gloo", rank=rank, world_size=count)
 
 
-def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerCfg:
+def agent(config: Config, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerCfg:
     """Configuration of the runner.
 
     Args:
-        learning: the numbers.
-        stage: one of `draft.learn.task.config.STAGES`.
+        config: the numbers.
+        stage: one of `draft.learn.task.stages.STAGES`.
         seed: seed of the first weights and of the actions.
     """
+    learning = config.learning
     return RslRlOnPolicyRunnerCfg(
         seed=seed,
         actor=RslRlModelCfg(
@@ -88,11 +89,11 @@ def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerC
         experiment_name=f"draft_{stage}",
         logger="tensorboard",
         num_steps_per_env=learning.steps,
-        max_iterations=learning.iterations(stage),
+        max_iterations=config.iterations(stage),
         save_interval=learning.save_every,
     )
 
 
-def agent_settings(learning: Learning, stage: str, seed: int = 0) -> dict[str, Any]:
+def agent_settings(config: Config, stage: str, seed: int = 0) -> dict[str, Any]:
     """Configuration of the runner as the plain data that rsl-rl takes, and changes."""
-    return asdict(agent(learning, stage, seed))
+    return asdict(agent(config, stage, seed))

@@ -56,7 +56,7 @@ class Loaded:
         # rsl-rl prints the networks as long tables.
         with contextlib.redirect_stdout(io.StringIO()):
             self.env = RslRlVecEnvWrapper(env)
-            numbers = agent_settings(run.plan.config.learning, run.plan.stage, run.plan.seed)
+            numbers = agent_settings(run.plan.config, run.plan.stage, run.plan.seed)
             self.runner = Runner(self.env, numbers, None, device)
         try:
             self.policy = self.load(self.iteration)

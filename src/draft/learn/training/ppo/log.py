@@ -195,5 +195,5 @@ def _start_wandb(folder: Path, project: str, config: Mapping[str, Any]) -> Any:
         )
     except Exception as error:  # Network, login, quota: whatever its client raises.
         cause = f"Weights & Biases cannot be used: {error}"
-        remedy = "run 'wandb login', set WANDB_MODE=offline, or omit --wandb"
+        remedy = "run 'wandb login', set WANDB_MODE=offline, or omit `wandb`"
         raise DraftError(cause, remedy) from None

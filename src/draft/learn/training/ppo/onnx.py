@@ -26,6 +26,7 @@ from draft.files import write
 from draft.learn.bodies.features import family_features, features
 from draft.learn.policy.matching import structure_of
 from draft.learn.task.mdp.commands import command_term
+from draft.learn.task.stages import is_like
 from draft.learn.task.world.access import robot_of
 from draft.learn.training.ppo.loaded import Loaded
 from draft.learn.training.ppo.ppo import action_std
@@ -66,7 +67,7 @@ def metadata(player: Loaded, run: Run) -> dict[str, str]:
     if not isinstance(action, JointPositionAction):
         raise TypeError(f"the action is a {type(action).__name__}, not a joint position")
     largest = command_term(env).largest[0].tolist()
-    if plan.stage == "velocity" and plan.config.velocity.growth:
+    if is_like(plan.stage, "velocity") and plan.config.velocity.growth:
         largest[0] = commanded(run, player.iteration) or largest[0]
     values |= {
         "joint_stiffness": stiffness,

@@ -102,7 +102,7 @@ class Ppo(PPO):
             if self._symmetry.deviation() > _ASYMMETRIC:
                 # The units of another network are no pairs: the projection would be noise.
                 cause = "the policy to start from is not mirror-symmetric, and this training is"
-                raise DraftError(cause, "--set learning.mirror=false")
+                raise DraftError(cause, "`values` learning.mirror=false")
             self._symmetry.project()
         return loaded
 

@@ -66,7 +66,7 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
             one.pop(name, None)
     if {k: v.shape for k, v in tensors.items()} != {k: v.shape for k, v in saved.items()}:
         cause = "the saved state is of another environment, or of another version of Draft or mjlab"
-        raise DraftError(cause, "start a new run from its policy: --from RUN")
+        raise DraftError(cause, "start a new run from its policy: `origin=RUN`")
     _wait(env)
     if state.get("designs"):
         env.scene["robot"].restore(state["designs"])

@@ -32,7 +32,7 @@ SAVE_SECONDS = 60.0
 SCAN = "height_scan"
 _BROKEN = (
     "delete the run's folder and train again, or start another run from its policy: "
-    "--from RUN --out DIR"
+    "`origin=RUN` `out=DIR`"
 )
 
 
@@ -87,7 +87,7 @@ class Trainer:
         cfg.seed = seed
         self.env = make(cfg, device, engine)
         self._wrapped = RslRlVecEnvWrapper(self.env)
-        self._numbers = agent_settings(plan.config.learning, plan.stage, seed)
+        self._numbers = agent_settings(plan.config, plan.stage, seed)
         self.runner = Runner(self._wrapped, self._numbers, None, device)
         self._ranks = Ranks(rank, self.runner.gpu_world_size, device)
         self._seen = self._wrapped.get_observations()
@@ -310,7 +310,7 @@ class Trainer:
                 self._bodies.restore(content["bodies"])
         except (KeyError, RuntimeError, ValueError, TypeError) as error:
             cause = f"{file} is of another design, or of another version: {first_sentence(error)}"
-            remedy = "start a new run from its policy: --from RUN"
+            remedy = "start a new run from its policy: `origin=RUN`"
             raise DraftError(cause, remedy) from None
 
     def _diverged(self, what: str) -> DraftError:
@@ -318,7 +318,7 @@ class Trainer:
             f"iteration {self.iteration + 1}: {what} are not finite; stopped, with "
             f"{self._run.folder} at its last checkpoint"
         )
-        remedy = "try another --seed or a lower learning.learning_rate, or check the design"
+        remedy = "try another `seed` or a lower learning.learning_rate, or check the design"
         return DraftError(cause, remedy)
 
 
@@ -328,7 +328,7 @@ def _check_processes(file: Path, content: dict[str, Any], count: int) -> None:
     if wrote != count:
         cause = f"{file} was written by {counted(wrote, 'process')}, and this run has {count}"
         remedy = (
-            "use as many with --device (GPUs) or --replicas (a CPU), or start a new run from its "
-            "policy: --from RUN"
+            "use as many with `device` (GPUs) or `replicas` (a CPU), or start a new run from its "
+            "policy: `origin=RUN`"
         )
         raise DraftError(cause, remedy)

@@ -126,5 +126,5 @@ def _load(
         alg.load(fit(content), dict.fromkeys(("actor", *more), True), strict=True)
     except (KeyError, RuntimeError) as error:
         cause = f"the policy of {file} does not fit: {first_sentence(error)}"
-        remedy = "use one with the same layers, --see-design and height scan"
+        remedy = "use one with the same layers, `see_design` and height scan"
         raise DraftError(cause, remedy) from None

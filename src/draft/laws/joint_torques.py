@@ -14,9 +14,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from draft.fitting.structure.attribution import usable
-from draft.fitting.structure.roles import UNPRICED
-from draft.fitting.structure.survey_rows import Row, read
+from draft.laws.joint_roles import UNPRICED
+from draft.laws.survey import Row, read, usable
 
 # Weight of the common slope, as a sum of squares of ln(leg).
 COMMON = 0.5

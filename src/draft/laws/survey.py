@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from draft.description.xmlfile import DescriptionError
-from draft.errors import Location, Problem
+from draft.errors import DraftError, Location, Problem
 
 FILE = Path(__file__).resolve().parent / "data" / "segments.csv"
 COLUMNS = (
@@ -47,6 +46,7 @@ COLUMNS = (
 LIGHTEST = 1e-6
 SHORTEST = 1e-3
 THINNEST = 1e-4
+STRONGEST = 1000.0
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,11 @@ class Row:
         return math.prod(self.box) if min(self.box) > THINNEST else 0.0
 
 
+def usable(effort: float) -> bool:
+    """Whether a declared torque [N m] gives an actuator mass: above 0, at most 1000."""
+    return math.isfinite(effort) and 0.0 < effort <= STRONGEST
+
+
 def write(rows: Iterable[Row]) -> str:
     """Text of the table, with eight significant digits."""
     out = io.StringIO()
@@ -122,25 +127,25 @@ def read(path: Path = FILE) -> list[Row]:
     """Read a table of segments; the shipped one by default.
 
     Raises:
-        DescriptionError: the file is missing or not such a table; the message gives the row.
+        DraftError: the file is missing or not such a table; the message gives the row.
     """
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         cause = f"cannot read it: {getattr(error, 'strerror', None) or 'not UTF-8 text'}"
-        raise DescriptionError(Problem(cause, Location(str(path)))) from None
+        raise DraftError(Problem(cause, Location(str(path)))) from None
     reader = csv.DictReader(io.StringIO(text))
     if tuple(reader.fieldnames or ()) != COLUMNS:
         remedy = "write one: draft survey parse"
         cause = "its columns are not those of a segment table"
-        raise DescriptionError(Problem(cause, Location(str(path), 1), remedy))
+        raise DraftError(Problem(cause, Location(str(path), 1), remedy))
     rows: list[Row] = []
     for record in reader:
         try:
             rows.append(_row(record))
         except (ValueError, TypeError):
             where = Location(str(path), reader.line_num)
-            raise DescriptionError(Problem("a cell of this row is not a number", where)) from None
+            raise DraftError(Problem("a cell of this row is not a number", where)) from None
     return rows
 
 

@@ -1,0 +1,178 @@
+"""Stages of training: what each starts from, how it is evaluated, and its changes of the task.
+
+All stages share one environment (`draft.learn.task.mdp.environment`): walking at a commanded
+velocity, with pushes. A stage is a function that changes its configuration, with the numbers of the
+group of its name. This module loads neither mjlab nor PyTorch; the functions do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from draft.extensions import Registry
+from draft.learn.task.constants import Scaled, scaled
+
+if TYPE_CHECKING:
+    from mjlab.envs import ManagerBasedRlEnvCfg
+
+    from draft.learn.task.mdp.commands import VelocityCommandCfg
+    from draft.learn.task.world.task import Task
+
+Change = Callable[["ManagerBasedRlEnvCfg", "Task"], None]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of training.
+
+    Attributes:
+        name: its name.
+        change: changes mjlab's configuration of the environment that all stages share.
+        origin: stage whose policy it starts from; None to start from scratch.
+        like: stage whose changes are made first; None for none.
+        shares: group of numbers with the shares of the kinds of ground.
+        uneven: whether it needs uneven ground; recipes may train others on a plane.
+        battery: name of the battery that evaluates its policies.
+    """
+
+    name: str
+    change: Change
+    origin: str | None = "base"
+    like: str | None = None
+    shares: Literal["ground", "terrain"] = "ground"
+    uneven: bool = False
+    battery: str = "walk"
+
+    def apply(self, cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
+        """Make the changes of the stage, after those of the stage that it is like."""
+        if self.like is not None:
+            STAGES[self.like].apply(cfg, task)
+        self.change(cfg, task)
+
+
+STAGES: Registry[Stage] = Registry("stage")
+
+
+def is_like(stage: str, other: str) -> bool:
+    """Return whether a stage is another one, or makes its changes first."""
+    found = STAGES.get(stage)
+    deeper = found.like if found else None
+    return stage == other or (deeper is not None and is_like(deeper, other))
+
+
+def base(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
+    """Walk on gently uneven ground at a commanded velocity, with pushes."""
+    cfg.rewards["action_rate"].params["ramp"] = task.config.rewards.action_rate_ramp
+
+
+def velocity(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
+    """Follow commands that grow far beyond the estimated top speed."""
+    from mjlab.managers.curriculum_manager import CurriculumTermCfg
+    from mjlab.managers.reward_manager import RewardTermCfg
+
+    from draft.learn.task.mdp import curriculums, rewards
+    from draft.learn.task.mdp.commands import Growth, Pushed
+    from draft.learn.task.mdp.events import strong_pushes
+
+    config, v = task.config, task.config.velocity
+    command, terms = _command(cfg), cfg.rewards
+    start = command.forward
+    command.set_largest(Scaled(v.forward), Scaled(v.sideways), Scaled(v.turn), task)
+    command.limit = None
+    if v.growth:
+        command.growth = Growth(start, scaled(v, "growth"), v.tracked, v.missed)
+        cfg.curriculum["fastest"] = CurriculumTermCfg(func=curriculums.fastest)
+    else:
+        command.ramp = v.ramp
+        params = {"ramp": v.ramp, "steps": config.learning.steps}
+        cfg.curriculum["speed_share"] = CurriculumTermCfg(func=curriculums.logged, params=params)
+    if v.pushed:
+        command.pushed = Pushed(v.pushed, *_slow(task))
+        pushes = cfg.events["push"].params
+        pushes["kinds"] = (*pushes["kinds"], strong_pushes(config))
+        pushes["share"] = v.pushed
+    tracking, air_time = terms["linear_velocity"], terms["air_time"]
+    if v.relative:
+        tracking.func = rewards.track_relative
+        tracking.params["share"] = v.relative
+    else:
+        tracking.func = rewards.track_capped
+        tracking.params = {"headroom": v.headroom, "share": v.sigma}
+    air_time.weight = v.air_time_weight
+    air_time.params["most"] = Scaled(v.air_time_most)
+    terms["action_rate"].weight = v.action_rate_weight
+    terms["speed"] = RewardTermCfg(
+        func=rewards.speed,
+        weight=v.speed_weight,
+        params={"headroom": v.headroom, "gate": v.speed_gate},
+    )
+
+
+def terrain(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
+    """Move to harder rows of ground by crossing easier ones."""
+    from mjlab.managers.curriculum_manager import CurriculumTermCfg
+    from mjlab.managers.reward_manager import RewardTermCfg
+
+    from draft.learn.task.mdp import curriculums, rewards
+    from draft.learn.task.mdp.commands import Away
+
+    t, command = task.config.terrain, _command(cfg)
+    command.limit = t.limit
+    if t.forward[1]:
+        low, high = t.forward
+        command.away = Away(Scaled(low, 0.5), Scaled(high, 0.5), t.away)
+    if t.episode:
+        cfg.terminations["time_out"].params["length"] = scaled(t, "episode")
+    if t.progress:
+        gate = scaled(task.config.rewards, "clearance_gate")
+        cfg.rewards["progress"] = RewardTermCfg(
+            func=rewards.progress, weight=t.progress, params={"gate": gate}
+        )
+    if task.ground == "uneven":
+        # A robot that runs away from hard ground has not mastered it.
+        cfg.terminations["left_ground"].time_out = False
+        params = {"promotion": t.promotion, "demotion": t.demotion, "by_way": t.by_way}
+        cfg.curriculum["row"] = CurriculumTermCfg(func=curriculums.rows, params=params)
+
+
+def push(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
+    """Withstand pushes of the same size for every design, which grow."""
+    from mjlab.managers.curriculum_manager import CurriculumTermCfg
+
+    from draft.learn.task.mdp import curriculums
+    from draft.learn.task.mdp.events import strong_pushes
+
+    p, command = task.config.push, _command(cfg)
+    command.set_largest(*_slow(task), task)
+    command.limit = None
+    cfg.events["push"].params["kinds"] = (strong_pushes(task.config),)
+    cfg.rewards["linear_velocity"].params = {"sigma": Scaled(p.sigma)}
+    params = {"ramp": p.ramp, "steps": task.config.learning.steps}
+    cfg.curriculum["push_factor"] = CurriculumTermCfg(func=curriculums.logged, params=params)
+
+
+def _command(cfg: ManagerBasedRlEnvCfg) -> VelocityCommandCfg:
+    """Return the configuration of the velocity command."""
+    from draft.learn.task.world.access import COMMAND
+
+    # mjlab declares the base class of all commands.
+    return cfg.commands[COMMAND]  # type: ignore[return-value]
+
+
+def _slow(task: Task) -> tuple[Scaled, Scaled, Scaled]:
+    """Largest commands of robots that are pushed strongly."""
+    p = task.config.push
+    return Scaled(p.forward), Scaled(p.sideways), Scaled(p.turn)
+
+
+# Stages of the paper, which a study trains unless its file names others.
+PUBLISHED = (
+    Stage("base", base, origin=None),
+    Stage("velocity", velocity, battery="speed"),
+    Stage("terrain", terrain, shares="terrain", uneven=True, battery="stairs"),
+    Stage("push", push, battery="push"),
+)
+for _stage in PUBLISHED:
+    STAGES.add(_stage.name, _stage, __name__)
