@@ -266,8 +266,8 @@ MUTANTS = (
     ),
     Mutant(
         "study/graph.py",
-        "base = base or training",
-        "base = training",
+        "determinants | {\"iterations\": iterations}",
+        "determinants",
         ("study/test_jobs.py",),
     ),
     Mutant(

@@ -15,7 +15,7 @@ from draft.files import lock
 from tests.written import edit, write_robot
 
 SMALL = (
-    # Several processes are tests/learn/test_ranks.py's.
+    # Several processes are tests/learn/engine/test_ranks.py's.
     *("--envs", "4", "--device", "cpu", "--replicas", "1", "--ground", "uneven", "--set"),
     *("learning.steps=4", "learning.hidden=16,16", "ground.rows=4", "ground.border=2"),
 )

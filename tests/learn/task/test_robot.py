@@ -11,7 +11,7 @@ pytest.importorskip("mjlab")
 import numpy as np
 import torch
 
-from tests.learn.lab.states import each, stand
+from tests.learn.task.states import each, stand
 
 TORQUE, SPEED = (72.0, 450.0, 332.0), (40.0, 11.31, 3.93)
 # Speeds per no-load speed: driving, braking, and beyond no-load speed.

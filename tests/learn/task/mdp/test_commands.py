@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("mjlab")
 import torch
 
-from tests.learn.lab.states import each, place, roots, turn
+from tests.learn.task.states import each, place, roots, turn
 
 FORWARD, SIDEWAYS, TURN = (
     (1.0, 1.241639, 1.645701),

@@ -26,7 +26,7 @@ from draft.model.model import preview
 from draft.studio.walker import Walker
 from draft.values import scalar
 
-GO2 = Path(__file__).parents[2] / "examples/descriptions/unitree_go2/go2.urdf"
+GO2 = Path(__file__).parents[3] / "examples/descriptions/unitree_go2/go2.urdf"
 LEGS = ("FL", "FR", "RL", "RR")
 JOINTS = ("hip_roll", "hip_pitch", "knee")
 PLACES = {"FL": "", "FR": "mirror: y", "RL": "mirror: x", "RR": "mirror: xy"}

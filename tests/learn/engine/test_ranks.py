@@ -33,7 +33,7 @@ from draft.learn.training.run import create, open_run  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
 BOTH = (NATIVE, 2)  # Engine and processes.
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @given(st.integers(0, 2**31 - 1), st.integers(1, 1024))

@@ -147,7 +147,7 @@ def test_the_ends_of_a_feature_are_said_to_be_for_the_size_of_the_design() -> No
 def test_the_page_of_learning_tells_the_lengths_that_the_family_is_valid_for() -> None:
     known = open_policy(FAMILY).known
     ends = dict(zip(FEATURES, np.exp(np.transpose(known)).tolist(), strict=True))
-    page = " ".join((Path(__file__).parents[2] / "docs/learning.md").read_text("utf-8").split())
+    page = " ".join((Path(__file__).parents[3] / "docs/learning.md").read_text("utf-8").split())
     legs = [f"{REFERENCE_LEG * end:.3f}" for end in ends["leg length"]]
     assert f"its legs are {legs[0]} to {legs[1]} m long" in page
     low, high = ends["thigh"]

@@ -27,7 +27,7 @@ from tests.waiting import alive, until
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("torchrunx") is None, reason="torchrunx is not installed"
 )
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "src"), str(ROOT)])}
 
 

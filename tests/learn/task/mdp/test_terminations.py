@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("mjlab")
 import torch
 
-from tests.learn.lab.states import each, first, place, stand, turn
+from tests.learn.task.states import each, first, place, stand, turn
 
 # 20 sqrt(s) seconds at 50 Hz, rounded up.
 STEPS = (1000, 1242, 1646)

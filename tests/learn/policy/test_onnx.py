@@ -23,7 +23,7 @@ from draft.learn.watching.play import Player  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning:mujoco_warp.*")
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "learning.md"
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "learning.md"
 
 
 @pytest.fixture(scope="module")

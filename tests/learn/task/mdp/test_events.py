@@ -12,7 +12,7 @@ from mjlab.utils.lab_api.math import quat_apply
 
 from draft.learn.task.constants import Scaled
 from draft.learn.task.mdp import events
-from tests.learn.lab.states import each, place, roots, turn
+from tests.learn.task.states import each, place, roots, turn
 
 LEVEL, YAWED, TILTED = (1.0, 0.0, 0.0, 0.0), turn("z", 1.3), turn("x", 0.8)
 MOST = torch.tensor([0.5, 0.5, 0.4, 0.52, 0.52, 0.78])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from draft.learn.task.config import Config
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "learning.md"
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "learning.md"
 DIMENSIONS = ("m", "s", "m/s", "rad/s")
 
 

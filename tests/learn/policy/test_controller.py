@@ -24,8 +24,8 @@ from draft.learn.training.ppo.onnx import export
 from draft.learn.training.ppo.trainer import Trainer
 from draft.learn.training.run import create
 from draft.learn.watching.play import Player
-from tests.learn.lab.states import place, turn
 from tests.learn.small import plan
+from tests.learn.task.states import place, turn
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 COMMAND = (0.4, 0.1, -0.2)

@@ -17,7 +17,7 @@ from draft.learn.task.constants import ramp_at
 from draft.learn.task.groups import Ramp
 from draft.learn.task.mdp import curriculums
 from draft.learn.training.ppo.log import Tally
-from tests.learn.lab.states import ask, roots
+from tests.learn.task.states import ask, roots
 
 ALONE = Ranks(0, 1, "cpu")
 RAMPS = (Config().velocity.ramp, Config().push.ramp)

@@ -20,7 +20,7 @@ import draft
 from draft.learn.task.constants import Scaled
 from draft.learn.task.groups import Rewards
 from draft.learn.task.mdp import rewards
-from tests.learn.lab.states import ask, each, first, place, roots, stand, turn
+from tests.learn.task.states import ask, each, first, place, roots, stand, turn
 
 TILT = 0.3
 

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("mjlab")
 import torch
 
-from tests.learn.lab.states import place, stand, turn
+from tests.learn.task.states import place, stand, turn
 
 PITCH, TOP = 0.025, 20.0
 FIELDS = ("slope", "slope_pit", "rough", "waves")

@@ -22,7 +22,7 @@ from draft.learn.measuring.scalars import (
     tallest,
     traversed,
 )
-from tests.learn.columns import stood, worlds
+from tests.learn.measuring.columns import stood, worlds
 
 
 def both(*parts: Worlds) -> Worlds:

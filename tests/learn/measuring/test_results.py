@@ -28,7 +28,7 @@ from draft.learn.measuring.scalars import Worlds
 from draft.learn.measuring.summary import Request, Summary, parse
 from draft.learn.measuring.utilisation import BINS, CELLS, Histograms
 from draft.learn.training.run import Run, create
-from tests.learn.columns import worlds
+from tests.learn.measuring.columns import worlds
 from tests.learn.small import plan
 
 parquet = pytest.importorskip("pyarrow.parquet")

@@ -16,7 +16,7 @@ from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.measuring import learned_metrics as learned  # noqa: E402
 from draft.learn.measuring.policies import open_source  # noqa: E402
 from draft.metrics import of_policy  # noqa: E402
-from tests.learn.test_matching import GO2, LEGS, made, tree  # noqa: E402
+from tests.learn.policy.test_matching import GO2, LEGS, made, tree  # noqa: E402
 
 pytestmark = [
     pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch"),

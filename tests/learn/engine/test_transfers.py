@@ -21,7 +21,7 @@ import torch
 from torch.utils._python_dispatch import TorchDispatchMode
 
 import draft
-from tests.learn.lab.states import place
+from tests.learn.task.states import place
 
 SOURCES = {"draft": Path(draft.__file__).parent, "mjlab": Path(mjlab.__file__).parent}
 READS = {"aten::_local_scalar_dense", "aten::item", "aten::nonzero", "aten::masked_select"}
@@ -133,7 +133,7 @@ def _as_mjlab(call: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", sorted(SOURCES["draft"].glob("learn/lab/mdp/*.py")), ids=lambda path: path.name
+    "path", sorted(SOURCES["draft"].glob("learn/task/mdp/*.py")), ids=lambda path: path.name
 )
 def test_no_term_copies_a_tensor_to_the_host(path: Path) -> None:
     """What a count on the CPU cannot see."""

@@ -22,8 +22,8 @@ from draft.learn.task.world.task import Task  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.run import Plan, create, open_run  # noqa: E402
 from draft.learn.training.session import begin  # noqa: E402
+from tests.learn.bodies.test_legged import walker  # noqa: E402
 from tests.learn.small import SMALL  # noqa: E402
-from tests.learn.test_legged import walker  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning:mujoco_warp.*")
 NATIVE = pytest.param(

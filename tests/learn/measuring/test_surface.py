@@ -37,7 +37,7 @@ from tests.learn.small import member, plan  # noqa: E402
 pytestmark = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")
 TRAINED = ("thigh_length=0.22:0.28", "actuators.leg.peak_torque=50:90")
 # The thigh of 0.85 m is far outside what was trained, and a motor of 400 N m is refused.
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PLANE = ("thigh_length=0.25,0.85", "actuators.leg.peak_torque=72,85,400")
 
 

@@ -17,7 +17,7 @@ from draft.learn.measuring.energy import NAMES, add_energy, supply, supply_recor
 from draft.learn.measuring.scalars import Worlds, curves, electrical_power, scalars
 from draft.learn.measuring.summary import Summary
 from draft.metrics import travel
-from tests.learn.columns import worlds
+from tests.learn.measuring.columns import worlds
 from tests.learn.small import member
 
 ROBOT = replace(member(), mass=20.0, battery=(500.0, 500.0, 500.0))

@@ -19,9 +19,9 @@ from draft.learn.measuring.results import make_request
 from draft.learn.measuring.rollout.trial import trial
 from draft.learn.task.mdp import events
 from draft.learn.training.run import create
-from tests.learn.lab.conftest import WORLDS
-from tests.learn.lab.states import place, roots
+from tests.learn.conftest import WORLDS
 from tests.learn.small import plan
+from tests.learn.task.states import place, roots
 
 FIELDS = ("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_subtreemass")
 

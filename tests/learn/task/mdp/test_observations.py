@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("mjlab")
 import torch
 
-from tests.learn.lab.states import ask, each, first, place, stand, turn
+from tests.learn.task.states import ask, each, first, place, stand, turn
 
 # Section 6 of the study: terms in their order, sizes, noise, scales.
 ACTOR = {

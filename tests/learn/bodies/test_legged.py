@@ -20,7 +20,7 @@ from draft.errors import DraftError, RefusedError
 from draft.learn.bodies.legged import CLASSES, LeggedRobot, check_family, legged_robot
 
 SHIPPED = Path(draft.__file__).parent / "robots" / "quadruped"
-SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
+SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[3].parent / "shared"))
 ROBOTS = SHARED / "robots"
 REAL = {
     "go2": "twins/go2/go2_description.urdf",
