@@ -52,7 +52,7 @@ MUTANTS = (
         "geometry.py",
         "(c + t * x * x, t * x * y - s * z, t * x * z + s * y)",
         "(c + t * x * x, t * x * y - s * z, t * x * z - s * y)",
-        ("model/test_symmetry.py", "design/test_units.py"),
+        ("model/test_slides.py", "model/test_export.py", "model/test_symmetry.py"),
     ),
     Mutant(
         "values.py",
@@ -109,7 +109,7 @@ MUTANTS = (
         "design/filter.py",
         "torque > rated * ROUNDING",
         "torque > 2 * rated",
-        ("design/test_filter.py", "design/test_rated_torque.py"),
+        ("metrics/test_heat.py",),
     ),
     Mutant(
         "design/solids.py",
@@ -184,7 +184,7 @@ MUTANTS = (
         "imports/drives.py",
         "return max(law.sigma, SIGMA_FLOOR) + 0.5 * beyond",
         "return max(law.sigma, SIGMA_FLOOR)",
-        ("imports/test_drives.py",),
+        ("imports/test_drives.py", "imports/test_summary.py"),
     ),
     # Explore.
     Mutant(
@@ -197,7 +197,7 @@ MUTANTS = (
         "explore/sample.py",
         "bits.advance(start * axes)",
         "bits.advance(start)",
-        ("explore/test_screen.py",),
+        ("explore/test_vary.py",),
     ),
     Mutant(
         "explore/vary.py",
@@ -266,7 +266,7 @@ MUTANTS = (
     ),
     Mutant(
         "study/graph.py",
-        "determinants | {\"iterations\": iterations}",
+        'determinants | {"iterations": iterations}',
         "determinants",
         ("study/test_jobs.py",),
     ),

@@ -153,6 +153,7 @@ def renderer(monkeypatch: pytest.MonkeyPatch) -> None:
     if not can_draw():
         pytest.skip("MuJoCo cannot draw on this machine")
     monkeypatch.setattr("draft.learn.policy.video.SIZE", (160, 90))
+    monkeypatch.setattr("draft.learn.policy.video._SUNS", 2)  # Each draws a strip's picture again.
 
 
 @pytest.mark.usefixtures("renderer")

@@ -210,6 +210,7 @@ def test_a_video_and_a_strip_are_written_whole(
     from draft.learn.policy import video
 
     monkeypatch.setattr(video, "SIZE", (160, 90))
+    monkeypatch.setattr(video, "_SUNS", 2)
     hold(player)
     video.film(player, 0.2, tmp_path / "new" / "a.mp4", tmp_path / "a.png", 3)
     meta = next(read_frames(str(tmp_path / "new" / "a.mp4")))
