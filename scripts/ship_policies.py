@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import onnx
+from draft.study.report.choice import median_seed
 from onnx import TensorProto, helper, numpy_helper
 
 from draft.files import write
@@ -20,7 +21,6 @@ from draft.learn.policy.policy import FAMILY, FOLDER, SKILLS
 from draft.learn.training.ppo.onnx import export
 from draft.learn.training.run import is_run, open_run
 from draft.learn.watching.play import Player
-from draft.study.report.choice import median_seed
 from draft.study.report.gather import gather
 
 

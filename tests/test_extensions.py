@@ -233,7 +233,7 @@ def test_screens_have_a_bit_for_each_check(install: Install, tmp_path: Path) -> 
     pq = pytest.importorskip("pyarrow.parquet")
     install("ext_check", CHECK.format(error=True, mask="design.mass > 0", kind="too_heavy"))
     out = tmp_path / "out.parquet"
-    draft.screen("hopper", {"thigh_length": (0.15, 0.3)}, n=8, out=out, workers=1)
+    draft.screen("hopper", vary={"thigh_length": (0.15, 0.3)}, n=8, out=out, workers=1)
     table = pq.read_table(out)
     assert set(table["refused_by"].to_pylist()) == {"too_heavy"}
     bit = 1 << [*kinds()].index("too_heavy")

@@ -43,6 +43,15 @@ def test_torque_is_full_up_to_the_corner_and_falls_in_a_line_to_no_load(
     assert a.torque_speed() == ((0.0, 60.0), (corner, 60.0), (20.0, 0.0))
 
 
+@given(st.floats(0.0, 19.9), st.floats(0.0, 20.0))
+def test_the_points_of_the_line_are_straight_along_the_torque_that_is_available(
+    corner: float, speed: float
+) -> None:
+    a = motor(corner)
+    speeds, torques = zip(*a.torque_speed(), strict=True)
+    assert np.interp(speed, speeds, torques) == pytest.approx(a.available(speed), abs=1e-9)
+
+
 @given(st.floats(0.0, 19.9), st.floats(0.0, 60.0))
 def test_the_fastest_speed_of_a_torque_is_where_the_line_has_it(
     corner: float, torque: float

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import copy
 import re
+from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import draft
 from draft.errors import DraftError
-from draft.model.batch_text import FIELDS, packed, read_fields, unpacked
+from draft.model.batch_text import FIELDS, read_fields
 from draft.model.mjcf import robot_texts
+from draft.model.texts import Text, of_template, with_template
 from draft.model.xml import parse
 from tests.model.test_batch import MIXED, SHIPPED, TOLERANCE, error, inertias, mixed, values_of
 
@@ -30,9 +33,13 @@ def names_of(texts: list[str]) -> list[str]:
     return [f"body {i}" for i in range(len(texts))]
 
 
+def read(texts: list[str]) -> tuple[mujoco.MjModel, dict[str, NDArray[Any]]]:
+    return read_fields(with_template([Text(text) for text in texts]), names_of(texts))
+
+
 def assert_same(texts: list[str]) -> None:
     """Fields of all texts, and those that are not returned are those of the first."""
-    first, fields = read_fields(texts, names_of(texts))
+    first, fields = read(texts)
     solid = first.geom_type != mujoco.mjtGeom.mjGEOM_MESH
     for row, text in enumerate(texts):
         alone = mujoco.MjModel.from_xml_string(text)
@@ -56,24 +63,27 @@ def test_fields_of_texts_are_those_of_the_models(name: str) -> None:
 def test_texts_are_one_template_and_their_numbers() -> None:
     design = draft.load("quadruped").resolve(values_of(draft.load("quadruped"), 200, 0.2))
     texts = robot_texts(design, np.flatnonzero(design.accepted)[:COUNT])
-    found = packed(texts)
-    assert found is not None
-    template, numbers = found
-    assert numbers.shape[0] == COUNT
+    template, numbers = texts[0].template, np.stack([text.numbers for text in texts])
+    assert {text.template for text in texts} == {template}
     assert len(set(numbers[:, 0])) > 1
-    assert unpacked(template, numbers) == texts
-    assert unpacked(template, numbers[:2]) == texts[:2]
+    written = [design[row].build().xml for row in np.flatnonzero(design.accepted)[:COUNT]]
+    assert [str(text) for text in texts] == written
+    assert of_template(template, numbers[:2]) == texts[:2]
     with pytest.raises(ValueError, match="have a place"):
-        unpacked(template, numbers[:, 1:])
+        of_template(template, numbers[:, 1:])
+    packed = with_template([Text(text) for text in written])
+    assert {one.template for one in packed} == {packed[0].template}
+    assert packed == texts
 
 
 def test_texts_that_differ_in_more_than_numbers_have_no_template() -> None:
     first, second = texts_of("hopper", 2)
     for odd in (second.replace("<worldbody>", "<worldbody >"), second.replace("body_", "corpus_")):
         assert odd != second
-        assert packed([first, odd]) is None
+        assert with_template([Text(first), Text(odd)])[1].template == odd
     named = first.replace('model="hopper"', 'model="%.10g"')
-    assert packed([named, named.replace('pos="0 0', 'pos="1 0')]) is None
+    other = named.replace('pos="0 0', 'pos="1 0')
+    assert [str(one) for one in with_template([Text(named), Text(other)])] == [named, other]
 
 
 def test_a_text_reads_back_as_it_was_written() -> None:
@@ -109,10 +119,10 @@ def test_a_text_that_differs_in_more_than_numbers_is_refused() -> None:
     for text, what in ((longer, "geom_type"), (renamed, "names")):
         assert text != second
         with pytest.raises(DraftError, match=rf"body 1 differs from body 0 in .*{what}"):
-            read_fields([first, text], ["body 0", "body 1"])
+            read([first, text])
 
 
 def test_a_text_that_mujoco_refuses_is_named() -> None:
     first, second = texts_of("quadruped", 2)
     with pytest.raises(DraftError, match="MuJoCo does not accept the model of body 1"):
-        read_fields([first, second.replace("<worldbody>", "<elsewhere>")], ["body 0", "body 1"])
+        read([first, second.replace("<worldbody>", "<elsewhere>")])

@@ -13,6 +13,7 @@ from draft.laws import actuators as law
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import Part
 from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantities
+from draft.laws.torque_speed import Line, stall_torque, torque_speed
 from draft.values import (
     Value,
     brief,
@@ -108,7 +109,7 @@ class Actuator(Quantities):
         """Torque of the motor at standstill without its current limit [N m]; at least the peak."""
         if not self.has_corner:
             return self.peak_torque
-        return self.peak_torque * (self.no_load_speed / (self.no_load_speed - self.corner_speed))
+        return stall_torque(self.peak_torque, self.no_load_speed, self.corner_speed)
 
     def available(self, speed: Value) -> Value:
         """Torque available at a speed in the direction of the torque [N m]; zero or more.
@@ -128,12 +129,9 @@ class Actuator(Quantities):
         speed = self.no_load_speed * maximum(1.0 - torque / self.stall_torque, 0.0)
         return where(torque <= self.peak_torque, speed, 0.0) if self.has_corner else speed
 
-    def torque_speed(self) -> tuple[tuple[Value, Value], ...]:
-        """Corners of the line of torque over speed, as pairs of rad/s and N m, speeds rising."""
-        ends = (0.0, self.peak_torque), (self.no_load_speed, 0.0)
-        if not self.has_corner:
-            return ends
-        return ends[0], (self.corner_speed, self.peak_torque), ends[1]
+    def torque_speed(self) -> Line:
+        """Points of the line of torque over speed, as pairs of rad/s and N m, speeds rising."""
+        return torque_speed(self.peak_torque, self.no_load_speed, self.corner_speed)
 
 
 class _Sizer:

@@ -34,7 +34,7 @@ def report(design: Design) -> dict[str, Any]:
         that contain 50 and 90 % of real ones.
     """
     population = structure_laws(design)
-    used = {body.actuator.name for body in design.bodies if body.actuator is not None}
+    used = [actuator.name for actuator in used_actuators(design)]
     return {
         "name": design.name,
         "design": design.label,
@@ -68,6 +68,12 @@ def report(design: Design) -> dict[str, Any]:
         "carried": [_carried(name, of) for name, of in carried_parts(design).items()],
         "bodies": design.body_masses(),
     }
+
+
+def used_actuators(design: Design) -> list[Actuator]:
+    """Actuator classes that drive a joint of the robot."""
+    used = {body.actuator.name for body in design.bodies if body.actuator is not None}
+    return [actuator for name, actuator in design.actuators.items() if name in used]
 
 
 def actuator_rows(actuators: Iterable[Actuator]) -> dict[str, Quantity]:

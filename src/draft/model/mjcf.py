@@ -21,6 +21,7 @@ from draft.design.cached import once
 from draft.design.design import Body, Design
 from draft.errors import DraftError
 from draft.geometry import Vector
+from draft.model.texts import Text, of_template
 from draft.model.xml import Element
 from draft.spec.primitives.base import COLORS, Color, Geom
 from draft.values import Array, Value, both, either, is_array, scalar, sqrt, where
@@ -48,13 +49,13 @@ def robot_xml(design: Design) -> str:
     return robot_element(design).text()
 
 
-def robot_texts(design: Design, rows: NDArray[np.intp]) -> list[str]:
-    """MJCF texts of some of N designs.
+def robot_texts(design: Design, rows: NDArray[np.intp]) -> list[Text]:
+    """MJCF texts of some of N designs, with one template.
 
     They are those of `robot_xml`, except that a frame that has no turn in one design but has in
     others is written out, and a trunk that may not be convex has no triangles.
     """
-    return robot_element(design).texts(rows)
+    return of_template(*robot_element(design).template(rows))
 
 
 def robot_element(design: Design) -> Element:

@@ -15,6 +15,8 @@ from draft.values import Array, Value
 
 # Value of an attribute; an array of shape (N,) is a number of N designs.
 Attribute = str | Value | Iterable[Value] | None
+# What a template has in place of a number.
+PLACE = "%.10g"
 
 
 class Element:
@@ -45,17 +47,19 @@ class Element:
         lines.append("")
         return "\n".join(lines)
 
-    def texts(self, rows: NDArray[np.intp]) -> list[str]:
-        """Texts of some of N designs whose numbers the element holds."""
+    def template(self, rows: NDArray[np.intp]) -> tuple[str, Array]:
+        """Text with a place for each number that differs in N designs, and those of some of them.
+
+        The numbers are as they are written, with ten digits, shape (M, places).
+        """
         pieces: list[str] = []
         numbers: list[Array] = []
         self._write_many(pieces, numbers, "")
-        form = "".join(pieces)
-        if not numbers:
-            return [form % ()] * len(rows)
+        form = _form(len(numbers))
         # Minus zero is written as zero.
         columns = [(values[rows] + 0.0).tolist() for values in numbers]
-        return [form % row for row in zip(*columns, strict=True)]
+        words = [(form % row).split() for row in zip(*columns, strict=True)] or [[]] * len(rows)
+        return "".join(pieces), np.array(words, dtype=np.float64)
 
     def _write_many(self, pieces: list[str], numbers: list[Array], indent: str) -> None:
         """Add the lines with a place for each number that differs, and these numbers."""
@@ -67,10 +71,10 @@ class Element:
             each = value if isinstance(value, tuple) else (value,)
             if any(isinstance(x, np.ndarray) for x in each):
                 numbers += [x for x in each if isinstance(x, np.ndarray)]
-                words = ["%.10g" if isinstance(x, np.ndarray) else _formatted(x) for x in each]
+                words = [PLACE if isinstance(x, np.ndarray) else _formatted(x) for x in each]
                 pieces.append(f' {key}="{" ".join(words)}"')
             else:
-                pieces.append(f' {key}="{_formatted(value)}"'.replace("%", "%%"))
+                pieces.append(f' {key}="{_formatted(value)}"')
         if not self.children:
             pieces.append("/>\n")
             return
@@ -153,4 +157,4 @@ def _numbers(values: tuple[float, ...]) -> str:
 
 @lru_cache(maxsize=64)
 def _form(count: int) -> str:
-    return " ".join(["%.10g"] * count)
+    return " ".join([PLACE] * count)

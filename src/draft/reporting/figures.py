@@ -11,6 +11,7 @@ import numpy as np
 
 from draft import plotting
 from draft.design.bands import actuator_bands
+from draft.design.report import used_actuators
 from draft.fitting.actuators import catalogue_figures as trends
 from draft.fitting.actuators.catalogue_rows import rows_of
 from draft.laws.catalogue import catalogue
@@ -18,7 +19,7 @@ from draft.laws.quantities import QUANTITIES
 from draft.model.picture import Exhibit, Pixels, corners, exhibit, stage
 from draft.model.picture import draw as render
 from draft.reporting import dots, plots
-from draft.reporting.plots import DASHES, PALETTE, parts, used
+from draft.reporting.plots import PALETTE, parts
 from draft.reporting.scene3d import YAW
 from draft.reporting.subjects import Subject
 from draft.reporting.tables import number
@@ -34,7 +35,6 @@ VIEW = (180, -9)
 _GAP = 0.15
 _DOT = 0.04  # width of a dot of a dot plot as a share of its scale
 _MARKS = ("o", "s", "D", "^", "P", "*")
-_LINES = dict(zip(DASHES, ("-", "--", ":", "-."), strict=True))
 
 
 def draw(folder: Path, subjects: Sequence[Subject]) -> list[Path]:
@@ -133,7 +133,7 @@ def _classes(ax: Axes, subjects: Sequence[Subject], x: str, y: str) -> None:
     """Plot a point per actuator class of each design, with its 90 % band."""
     across, up = QUANTITIES[x].factor, QUANTITIES[y].factor
     for subject in subjects:
-        for k, (name, actuator) in enumerate(used(subject).items()):
+        for k, actuator in enumerate(used_actuators(subject.design)):
             at, value = scalar(getattr(actuator, x)) * across, scalar(getattr(actuator, y)) * up
             band = actuator_bands(actuator).get(y, (value / up, value / up))
             low, high = (scalar(end) * up for end in band)
@@ -146,7 +146,7 @@ def _classes(ax: Axes, subjects: Sequence[Subject], x: str, y: str) -> None:
                 markersize=5,
                 markeredgecolor="white",
                 capsize=2,
-                label=f"{subject.title}, {name}",
+                label=f"{subject.title}, {actuator.name}",
             )
 
 
@@ -199,12 +199,10 @@ def torque_speed(subjects: Sequence[Subject]) -> Figure:
     from matplotlib import pyplot as plt
 
     figure, ax = plt.subplots(figsize=(1.3 * plotting.COLUMN, 0.9 * plotting.COLUMN))
-    for subject in subjects:
-        for k, (name, a) in enumerate(used(subject).items()):
-            style = _LINES[DASHES[k % len(DASHES)]]
-            speed, torque = ([scalar(x) for x in xs] for xs in zip(*a.torque_speed(), strict=True))
-            label = f"{subject.title}, {name}"
-            ax.plot(speed, torque, label=label, color=subject.color, linestyle=style)
+    for curve in plots.curves(subjects):
+        speed, torque = zip(*curve.line, strict=True)
+        style = plots.DASHES[curve.dashes]
+        ax.plot(speed, torque, label=curve.name, color=curve.color, linestyle=style)
     ax.set_xlabel("joint speed [rad/s]")
     ax.set_ylabel("torque [N m]")
     ax.set_xlim(0)

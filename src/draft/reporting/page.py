@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from draft.extras import missing, own_version
-from draft.reporting import dots, motion, plots, scene3d, tables
+from draft.reporting import dots, motion, plots, scene3d, tables, torque_speed
 from draft.reporting.subjects import Subject, table
 from draft.reporting.tables import Html, text
 from draft.webpage import webpage
@@ -158,12 +158,15 @@ def _actuators(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
         "Peak torque over speed at the joint: a straight line from standstill to no load, or from "
         "the corner speed of a class that states one."
     )
+    lines = plots.curves(subjects)
     return _section(
         "actuators",
         "Actuators",
         tables.actuators(subjects),
         _plot("trends", plots.trends(subjects), figures, trends),
-        _plot("curves", plots.curves(subjects), figures, curves),
+        f'<figure class="curves">{torque_speed.key(lines)}'
+        f"{torque_speed.plot(lines, size=(480, 220))}"
+        f"<figcaption>{escape(curves)}</figcaption></figure>",
         _details("Laws behind these numbers", tables.laws(subjects)),
     )
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from html import escape
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from draft.design.actuators import Actuator
 from draft.design.bands import actuator_bands
-from draft.design.report import carried_parts
+from draft.design.report import carried_parts, used_actuators
 from draft.fitting.actuators.catalogue_figures import (
     FAMILIES,
     OTHER,
@@ -24,6 +24,7 @@ from draft.laws.actuators import Laws
 from draft.laws.catalogue import catalogue
 from draft.laws.quantities import QUANTITIES
 from draft.reporting.subjects import Subject
+from draft.reporting.torque_speed import Curve
 from draft.values import scalar
 
 INK, RULE = "#24292f", "#e4e8ec"
@@ -31,7 +32,8 @@ CATALOGUE = "#9aa4af"  # colour of the modules, different from those of the desi
 PALETTE = ("#33608f", "#7fa3c7", "#b9c9da", "#c98d4f", "#e5c49a", "#6f9d80", "#b5d0bd", "#8d7aa5")
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "cross", "star")
 Figure = dict[str, Any]  # traces and layout, as Plotly's JSON
-DASHES = ("solid", "dash", "dot", "dashdot")
+# Dashes in SVG, and in matplotlib.
+DASHES = {"none": "-", "8 4": "--", "2 3": ":", "8 3 2 3": "-."}
 _MARKS = {"o": "circle", "s": "square", "^": "triangle-up", "D": "diamond"}
 
 
@@ -172,8 +174,7 @@ def _classes(subjects: Sequence[Subject], x: str, y: str) -> list[dict[str, Any]
     """Actuator classes of the designs, with their bands."""
     found = []
     for subject in subjects:
-        own = used(subject)
-        for k, (name, actuator) in enumerate(own.items()):
+        for k, actuator in enumerate(used_actuators(subject.design)):
             value = scalar(getattr(actuator, y)) * QUANTITIES[y].factor
             band = actuator_bands(actuator).get(y)
             low, high = (scalar(end) * QUANTITIES[y].factor for end in band or (0.0, 0.0))
@@ -183,8 +184,8 @@ def _classes(subjects: Sequence[Subject], x: str, y: str) -> list[dict[str, Any]
                 {
                     "type": "scatter",
                     "mode": "markers",
-                    "name": escape(f"{subject.title}, {name}"),
-                    "legendgroup": escape(f"{subject.title}, {name}"),
+                    "name": escape(f"{subject.title}, {actuator.name}"),
+                    "legendgroup": escape(f"{subject.title}, {actuator.name}"),
                     "x": _scaled([scalar(getattr(actuator, x))], x),
                     "y": [value],
                     "error_y": {"type": "data", "symmetric": False, "visible": band is not None}
@@ -202,35 +203,13 @@ def laws_of(subjects: Sequence[Subject]) -> Laws:
     return next(a.laws for subject in subjects for a in subject.design.actuators.values())
 
 
-def used(subject: Subject) -> dict[str, Actuator]:
-    """Actuator classes that drive a joint of the robot, by name."""
-    return {
-        name: actuator
-        for name, actuator in subject.design.actuators.items()
-        if subject.record["actuators"][name]["used"]
-    }
-
-
-def curves(subjects: Sequence[Subject]) -> Figure:
-    """Plot of torque over speed: a line from standstill to no load per actuator class."""
-    traces = [
-        {
-            "type": "scatter",
-            "mode": "lines",
-            "name": escape(f"{subject.title}, {name}"),
-            "x": [scalar(speed) for speed, _ in actuator.torque_speed()],
-            "y": [scalar(torque) for _, torque in actuator.torque_speed()],
-            "line": {"color": subject.color, "width": 2, "dash": DASHES[k % len(DASHES)]},
-            "hovertemplate": "%{x:.3g} rad/s, %{y:.3g} N m<extra>%{fullData.name}</extra>",
-        }
+def curves(subjects: Sequence[Subject]) -> list[Curve]:
+    """Torque-speed line of each actuator class."""
+    return [
+        Curve(f"{subject.title}, {actuator.name}", actuator, subject.color, dashes)
         for subject in subjects
-        for k, (name, actuator) in enumerate(used(subject).items())
+        for actuator, dashes in zip(used_actuators(subject.design), cycle(DASHES), strict=False)
     ]
-    axes = {
-        "xaxis": _axis("joint speed [rad/s]", rangemode="tozero"),
-        "yaxis": _axis("torque [N m]", rangemode="tozero"),
-    }
-    return {"data": traces, "layout": _layout(380, **axes)}
 
 
 def _scaled(values: ArrayLike, quantity: str) -> list[float]:

@@ -9,6 +9,7 @@ from draft.design.bands import actuator_bands
 from draft.design.findings import grouped
 from draft.design.report import actuator_rows, mass_parts
 from draft.design.widened import band
+from draft.reporting.svg import short
 from draft.studio import fields, plots
 from draft.studio.allowed_range import allowed
 from draft.studio.session import Session
@@ -161,15 +162,11 @@ def actuators(design: Design) -> str:
             band = ""
             if key in bands:
                 low, high = (scalar(x) * factor for x in bands[key])
-                band = (
-                    f"{low:.2g}–{high:.2g}"
-                    if high < 10
-                    else f"{plots.short(low)}–{plots.short(high)}"
-                )
+                band = f"{low:.2g}–{high:.2g}" if high < 10 else f"{short(low)}–{short(high)}"
             hint = escape(origin.detail if origin else "", quote=True)
             rows.append(
                 f'<tr title="{hint}"><td>{quantity.label} <span class="mute">{kind}</span></td>'
-                f'<td class="n">{plots.short(value)} <span class="mute">'
+                f'<td class="n">{short(value)} <span class="mute">'
                 f"{quantity.table_unit}</span></td>"
                 f'<td class="n mute">{band}</td></tr>'
             )

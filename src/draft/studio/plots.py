@@ -1,4 +1,4 @@
-"""Small plots as SVG text: trends, torque over speed, shares of the mass, limits.
+"""Small plots as SVG text: trends, shares of the mass, limits.
 
 The layout is for a width of 300 pixels; all text from a spec is escaped.
 """
@@ -11,15 +11,13 @@ from functools import lru_cache
 from html import escape
 from typing import NamedTuple
 
-INK, MUTED, LINE, GRID = "#1f2933", "#66727f", "#c3cad3", "#e7eaee"
+from draft.reporting.svg import GRID, document, path, short, text
+
 OURS, THEIRS, LAW = "#d9661f", "#9aa5b1", "#35618f"
 GOOD, BAD, WARN = "#2f855a", "#c0392b", "#b7791f"
 PALETTE = ("#35618f", "#7fa6cf", "#4d5866", "#8d99a8", "#b9c2cd", "#5b8c85", "#a3c4bc", "#d9dee4")
 WIDTH = 300
 _LEFT, _RIGHT, _TOP, _BOTTOM = 38, 8, 8, 30
-
-
-Line = Sequence[tuple[float, float]]
 
 
 class Marker(NamedTuple):
@@ -71,68 +69,13 @@ def trend(
     for fold, tint in ((folds[1], "0.10"), (folds[0], "0.16")):
         above = [axes.place(x, y * fold) for x, y in zip(xs, ys, strict=True)]
         below = [axes.place(x, y / fold) for x, y in zip(xs, ys, strict=True)]
-        d = _path([*above, *reversed(below)])
+        d = path([*above, *reversed(below)])
         parts.append(f'<path d="{d}Z" fill="{LAW}" fill-opacity="{tint}"/>')
-    line = _path([axes.place(x, y) for x, y in zip(xs, ys, strict=True)])
+    line = path([axes.place(x, y) for x, y in zip(xs, ys, strict=True)])
     parts.append(_cloud(axes, cloud))
     parts.append(f'<path d="{line}" fill="none" stroke="{LAW}" stroke-width="1.5"/>')
     parts += _markers(axes, list(markers))
-    return _svg(parts, axes.height)
-
-
-def torque_speed(
-    curves: Sequence[tuple[str, Line, bool]],
-    dots: Sequence[tuple[float, float, str]] = (),
-) -> str:
-    """Plot torque [N m] over speed [rad/s], one line per actuator class.
-
-    Args:
-        curves: name, corners of its line as pairs of speed and torque from standstill to no load,
-            and whether it is of the pinned design.
-        dots: speed and torque of joints, and a label for those that stand out.
-    """
-    height = 150
-    top = _round_up(max((line[0][1] for _, line, _ in curves), default=1.0))
-    right = _round_up(max((line[-1][0] for _, line, _ in curves), default=1.0))
-    wide, high = WIDTH - _LEFT - _RIGHT, height - _TOP - _BOTTOM
-    parts = []
-    for k in range(5):
-        x, y = _LEFT + wide * k / 4, _TOP + high * (1 - k / 4)
-        parts.append(f'<path d="M{_LEFT} {y:.1f}h{wide}M{x:.1f} {_TOP}v{high}" stroke="{GRID}"/>')
-        parts.append(_text(_LEFT - 5, y + 3, short(top * k / 4), "end"))
-        parts.append(_text(x, height - 18, short(right * k / 4), "middle"))
-    for k, (name, corners, pinned) in enumerate(curves):
-        y = _TOP + high * (1 - corners[0][1] / top)
-        bend, x = (_LEFT + wide * speed / right for speed, _ in corners[-2:])
-        color = THEIRS if pinned else (OURS, *PALETTE)[k % (len(PALETTE) + 1)]
-        style = 'stroke-dasharray="4 3"' if pinned else 'stroke-width="2"'
-        along = f"H{bend:.1f}" if bend > _LEFT else ""
-        line = f"M{_LEFT} {y:.1f}{along}L{x:.1f} {_TOP + high}"
-        if not pinned:
-            area = f"{line}H{_LEFT}Z"
-            parts.append(f'<path d="{area}" fill="{color}" fill-opacity="0.08"/>')
-            at = bend - _LEFT + (0.4 + 0.08 * (k % 4)) * (x - bend)
-            level = y + (at + _LEFT - bend) / (x - bend) * (_TOP + high - y)
-            parts.append(_text(_LEFT + at + 7, level - 4, name, "start", color, "600"))
-        parts.append(f'<path d="{line}" fill="none" stroke="{color}" {style}/>')
-    parts += [_dot(*dot, top, right, height) for dot in sorted(dots, key=lambda dot: dot[2])]
-    parts.append(_text(_LEFT + wide / 2, height - 4, "speed [rad/s]", "middle"))
-    parts.append(_text(_LEFT + 5, _TOP + 9, "torque [N m]", "start"))
-    return _svg(parts, height)
-
-
-def _dot(speed: float, torque: float, label: str, top: float, right: float, height: int) -> str:
-    """Dot of a joint in the plot of torque over speed; a large one with its label."""
-    wide, high = WIDTH - _LEFT - _RIGHT, height - _TOP - _BOTTOM
-    x = _LEFT + wide * min(speed / right, 1.0)
-    y = _TOP + high * (1 - min(torque / top, 1.0))
-    place = f'cx="{x:.1f}" cy="{y:.1f}"'
-    if not label:
-        return f'<circle {place} r="2.5" fill="{INK}" fill-opacity="0.35"/>'
-    away, side = (-8, "end") if x > WIDTH / 2 else (8, "start")
-    words = _text(x + away, y + 4, label, side, INK)
-    halo = f'<g stroke="#fff" stroke-width="3" paint-order="stroke">{words}</g>'
-    return f'<circle class="ds-dot" {place} r="5" fill="{INK}" stroke="#fff"/>{halo}'
+    return document(parts, WIDTH, axes.height)
 
 
 def shares(parts: Sequence[tuple[str, float]]) -> str:
@@ -146,7 +89,7 @@ def shares(parts: Sequence[tuple[str, float]]) -> str:
             f'fill="{PALETTE[k % len(PALETTE)]}"><title>{escape(label)}</title></rect>'
         )
         x += wide
-    return _svg(drawn, 14)
+    return document(drawn, WIDTH, 14)
 
 
 def limit(value: float, low: float, high: float, color: str, unit: str = "") -> str:
@@ -162,20 +105,21 @@ def limit(value: float, low: float, high: float, color: str, unit: str = "") -> 
         return min(max(share, 0.0), 1.0) * (WIDTH - 2) + 1
 
     a, b, v = at(low) if low > 0 else 1.0, at(high), at(value)
-    words = [_text(b, 31, short(high), "end" if b > 60 else "start")]
+    words = [text(b, 31, short(high), "end" if b > 60 else "start")]
     if low > 0:
-        words.append(_text(a, 31, short(low), "start" if b - a > 50 else "end"))
+        words.append(text(a, 31, short(low), "start" if b - a > 50 else "end"))
     side = "end" if v > WIDTH - 60 else "start" if v < 60 else "middle"
     label = f"{short(value)} {unit}".strip()
-    return _svg(
+    return document(
         [
             f'<rect y="14" width="{WIDTH}" height="6" rx="3" fill="{GRID}"/>',
             f'<rect x="{a:.1f}" y="14" width="{max(b - a, 1):.1f}" height="6" rx="1" '
             f'fill="{GOOD}" fill-opacity="0.45"/>',
             f'<path d="M{v:.1f} 11v12" stroke="{color}" stroke-width="3"/>',
-            _text(v, 9, label, side, color),
+            text(v, 9, label, side, color),
             *words,
         ],
+        WIDTH,
         34,
     )
 
@@ -197,13 +141,13 @@ def _frame(axes: Axes) -> str:
     for x in _ticks(axes.x):
         px, _ = axes.place(x, axes.y[0])
         parts.append(f'<path d="M{px:.1f} {_TOP}V{bottom}" stroke="{GRID}"/>')
-        parts.append(_text(px, bottom + 12, short(x), "middle"))
+        parts.append(text(px, bottom + 12, short(x), "middle"))
     for y in _ticks(axes.y):
         _, py = axes.place(axes.x[0], y)
         parts.append(f'<path d="M{_LEFT} {py:.1f}H{WIDTH - _RIGHT}" stroke="{GRID}"/>')
-        parts.append(_text(_LEFT - 5, py + 3, short(y), "end"))
-    parts.append(_text((_LEFT + WIDTH - _RIGHT) / 2, axes.height - 4, axes.x_title, "middle"))
-    parts.append(_text(_LEFT + 5, _TOP + 9, axes.y_title, "start"))
+        parts.append(text(_LEFT - 5, py + 3, short(y), "end"))
+    parts.append(text((_LEFT + WIDTH - _RIGHT) / 2, axes.height - 4, axes.x_title, "middle"))
+    parts.append(text(_LEFT + 5, _TOP + 9, axes.y_title, "start"))
     return "".join(parts)
 
 
@@ -226,7 +170,7 @@ def _markers(axes: Axes, markers: list[Marker]) -> list[str]:
                 at += 11
             labels.append((px, at))
             side = "end" if left else "start"
-            words = _text(px + (-9 if left else 9), at, label, side, OURS, "600")
+            words = text(px + (-9 if left else 9), at, label, side, OURS, "600")
             drawn.append(f'<g stroke="#fff" stroke-width="3" paint-order="stroke">{words}</g>')
     return drawn
 
@@ -243,36 +187,3 @@ def _along(x: float, of: tuple[float, float]) -> float:
     """Position of a number along a logarithmic axis, from 0 to 1."""
     share = math.log(max(x, 1e-300) / of[0]) / math.log(of[1] / of[0])
     return min(max(share, 0.0), 1.0)
-
-
-def _path(points: Sequence[tuple[float, float]]) -> str:
-    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
-
-
-def _text(
-    x: float, y: float, words: str, anchor: str, color: str = MUTED, weight: str = "400"
-) -> str:
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{color}" '
-        f'font-weight="{weight}">{escape(words)}</text>'
-    )
-
-
-def _svg(parts: Sequence[str], height: int) -> str:
-    return f'<svg viewBox="0 0 {WIDTH} {height}" class="ds-svg" role="img">{"".join(parts)}</svg>'
-
-
-def short(x: float) -> str:
-    """Text of a number with three digits; an exponent only for very large and small ones."""
-    if x == 0:
-        return "0"
-    if abs(x) >= 1e4 or abs(x) < 1e-3:
-        mantissa, _, exponent = f"{x:.1e}".partition("e")
-        return f"{mantissa.removesuffix('.0')}e{int(exponent)}"
-    return f"{x:.0f}" if abs(x) >= 1e3 else f"{x:.3g}"
-
-
-def _round_up(x: float) -> float:
-    """Smallest round number not below x whose quarters are round too."""
-    decade = 10.0 ** math.floor(math.log10(max(x, 1e-9)))
-    return next(k * decade for k in (1, 1.2, 1.6, 2, 2.4, 3.2, 4, 6, 8, 10) if k * decade >= x)

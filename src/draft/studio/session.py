@@ -87,10 +87,6 @@ class Session:
         """Name of the loaded design."""
         return self.point.base or DEFAULT
 
-    def can_undo(self) -> bool:
-        """Tell whether there is a step to undo."""
-        return bool(self._past)
-
     def value(self, name: str, of: Design | None = None) -> Setting:
         """Value of a parameter, or of `actuators.CLASS.QUANTITY`, in SI units."""
         design = of or self.design

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from itertools import cycle
 
-from draft.design import Design
 from draft.design.actuators import Actuator
+from draft.design.report import used_actuators
 from draft.laws.catalogue import catalogue
 from draft.laws.quantities import QUANTITIES
+from draft.reporting.torque_speed import Curve, plot
 from draft.studio import plots
 from draft.studio.session import Session
 from draft.studio.walker import Load
-from draft.values import scalar
 
 Cloud = tuple[tuple[float, float], ...]
 _DOTS = "Dots: the highest load of each joint in the last second, at speed 0 where it brakes."
@@ -31,22 +32,21 @@ def torque_speed(session: Session, loads: Sequence[Load] = ()) -> str:
     """Torque-speed line of each actuator class of the robot, and loads of its joints."""
     worst = max(loads, key=lambda load: load.share, default=None)
     dots = [(load.speed, load.torque, load.joint if load is worst else "") for load in loads]
-    curves = []
+    colors = cycle((plots.OURS, *plots.PALETTE))
+    curves = [
+        Curve(a.name, a, color, named=True)
+        for a, color in zip(used_actuators(session.design), colors, strict=False)
+    ]
     if session.pinned is not None:
-        curves += [(a.name, _line(a), True) for a in used(session.pinned.design)]
-    ours = [(a.name, _line(a), False) for a in used(session.design)]
-    drawn = plots.torque_speed([*ours, *curves], dots)
+        pinned = used_actuators(session.pinned.design)
+        curves += [Curve(a.name, a, plots.THEIRS, "4 3") for a in pinned]
     told = f'<div class="mute">{_DOTS}</div>' if loads else ""
-    return f'<div class="ds"><h3>Torque over speed</h3>{told}{drawn}</div>'
-
-
-def _line(actuator: Actuator) -> plots.Line:
-    return [(scalar(speed), scalar(torque)) for speed, torque in actuator.torque_speed()]
+    return f'<div class="ds"><h3>Torque over speed</h3>{told}{plot(curves, dots)}</div>'
 
 
 def trends(session: Session) -> str:
     """Trends with their bands, catalogue modules, and the actuators of this design."""
-    actuators = used(session.design)
+    actuators = used_actuators(session.design)
     if not actuators:
         return ""
     drawn = "".join(_trend(x, y, actuators, session) for x, y in VIEWS)
@@ -57,15 +57,6 @@ def trends(session: Session) -> str:
     )
 
 
-def used(design: Design) -> list[Actuator]:
-    """Actuator classes that drive a joint of the robot."""
-    return [
-        actuator
-        for actuator in design.actuators.values()
-        if any(body.actuator is actuator for body in design.bodies)
-    ]
-
-
 def _trend(x: str, y: str, actuators: list[Actuator], session: Session) -> str:
     first = actuators[0]
     law = first.laws.trends[y]
@@ -73,7 +64,8 @@ def _trend(x: str, y: str, actuators: list[Actuator], session: Session) -> str:
     axes = plots.Axes(x_range, y_range, QUANTITIES[x].axis, QUANTITIES[y].axis)
     markers = [_marker(x, y, actuator, False) for actuator in actuators]
     if session.pinned is not None:
-        markers += [_marker(x, y, actuator, True) for actuator in used(session.pinned.design)]
+        pinned = used_actuators(session.pinned.design)
+        markers += [_marker(x, y, actuator, True) for actuator in pinned]
     folds = (law.band(0.5), law.band(0.9))
     return plots.trend(axes, cloud, _along(x, y, first), folds, markers)
 

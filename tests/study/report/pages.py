@@ -26,8 +26,7 @@ def page_of(folder: Path) -> str:
     """The page without figures."""
     study = gather(folder)
     used = Utilisation(study)
-    warnings = [*study.warnings, *used.warnings]
-    return html(Contents(study, all_tables(study, used), {}, warnings).page())
+    return html(Contents(study, all_tables(study, used), {}).page())
 
 
 def to_html(table: Table) -> str:

@@ -62,7 +62,7 @@ def test_counted_samples_and_training_curves_are_the_same(source: Path, collecte
     )
     assert [dict(row) for row in one.run.rows] == [dict(row) for row in other.run.rows]
     assert 20 < len(other.run.rows) <= 50
-    ours, theirs = one.samples()[0]["push"], other.samples()[0]["push"]
+    ours, theirs = one.samples["push"], other.samples["push"]
     assert list(ours.plane) == list(theirs.plane) == ["hip roll", "hip pitch", "knee"]
     for joint in ours.plane:
         np.testing.assert_array_equal(ours.plane[joint], theirs.plane[joint])
@@ -98,7 +98,7 @@ def test_three_seeds_take_less_than_three_megabytes(collected: Path) -> None:
 def test_samples_are_small_even_if_all_that_torque_and_speed_can_be_is_met(tmp_path: Path) -> None:
     """36 runs stay below 3 MB with five digits in every bin and cell."""
     (one,) = gather(synthetic.study(tmp_path, arms=("nominal",), **SMALL)).evaluations
-    samples = one.samples()[0]["speed"]
+    samples = one.samples["speed"]
     full = Samples(
         {key: counts + 10_000 for key, counts in samples.counts.items()},
         {joint: cells + 10_000 for joint, cells in samples.plane.items()},

@@ -16,13 +16,16 @@ pytest.importorskip("pyarrow")
 from matplotlib import pyplot as plt
 from pyarrow import parquet
 
+from draft.design.actuators import size
 from draft.learn.measuring.utilisation import CELL, CELLS
-from draft.study.report import figures
+from draft.study.report import figures, plane
 from draft.study.report.gather import gather
 from draft.study.report.occupancy import Utilisation, percentile
 from draft.study.report.tables import utilisation
 from tests.learn import synthetic
 from tests.study.report.pages import SPEED_ONLY, to_html
+
+SHARES = np.linspace(0, 1, 21)
 
 
 def test_utilisation_pools_the_samples_of_all_seeds(source: Path) -> None:
@@ -81,8 +84,8 @@ def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(tmp_path
     told = json.loads((place / "summary.json").read_text())["utilisation"]["speed"]
     assert use is not None
     assert use.shares["knee", "torque"] == told["knee"]["torque"]
-    assert "utilisation.parquet cannot be read" in used.warnings[0]
-    assert "occupancy.parquet cannot be read" in used.warnings[1]
+    assert "utilisation.parquet cannot be read" in study.warnings[0]
+    assert "occupancy.parquet cannot be read" in study.warnings[1]
     drawn = {one.section for one in figures.single(study, used)}
     assert drawn == {"", "curves", "training"}
 
@@ -110,6 +113,26 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> N
     plt.close(figure)
 
 
+def test_a_corner_is_drawn_where_the_motor_has_it(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
+    study = gather(folder)
+    (robot,) = study.members.values()
+    knees = [k for k, place in enumerate(robot.joint_classes) if robot.classes[place] == "knee"]
+    speeds = [0.5 * speed if k in knees else 0.0 for k, speed in enumerate(robot.no_load_speed)]
+    cornered = replace(robot, corner_speed=tuple(speeds))
+    runs = tuple(replace(one, members=(cornered,)) for one in study.singles)
+    study = replace(study, singles=runs)
+    found = plane.shown(study, Utilisation(gather(folder)), "speed")
+    figure = plane.figure(study, "speed", found, 7.0)
+    stated = {"peak_torque": 60.0, "no_load_speed": 20.0}
+    straight, motor = size("leg", stated, None), size("leg", stated | {"corner_speed": 10.0}, None)
+    for ax, law in zip(figure.axes, (straight, straight, motor), strict=True):
+        line = next(one for one in ax.get_lines() if one.get_color() == "0.2")
+        drawn = np.interp(SHARES, *np.transpose(line.get_xydata()))
+        assert list(drawn) == pytest.approx([law.available(20.0 * x) / 60.0 for x in SHARES])
+    plt.close(figure)
+
+
 @pytest.mark.parametrize(
     ("column", "value", "words"),
     [
@@ -126,8 +149,8 @@ def test_counts_that_make_no_sense_are_omitted_or_kept_at_the_end(
     table = parquet.read_table(path)
     at = table.schema.get_field_index(column)
     parquet.write_table(table.set_column(at, column, [[value] * table.num_rows]), path)
-    used = Utilisation(gather(folder))
-    use = used.of("quadruped:cheetah", "speed")
+    study = gather(folder)
+    use = Utilisation(study).of("quadruped:cheetah", "speed")
     assert use is not None
-    assert [words in warning for warning in used.warnings] == [True] * bool(words)
+    assert [words in warning for warning in study.warnings] == [True] * bool(words)
     assert bool(use.samples.plane) == (not words)

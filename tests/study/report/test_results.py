@@ -50,7 +50,7 @@ kick/√(gL)  perturbed inertia  bear > cheetah   > 99 %             2
 def text_of(folder: Path, page: Path) -> str:
     study = files.read(folder)
     used = Utilisation(study)
-    contents = Contents(study, all_tables(study, used), {}, (), Source(folder, page, {}))
+    contents = Contents(study, all_tables(study, used), {}, Source(folder, page, {}))
     return markdown(contents.page(), page.parent)
 
 

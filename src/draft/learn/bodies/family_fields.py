@@ -25,4 +25,4 @@ def family_fields(
     Raises:
         DraftError: a design differs from the first in more than numbers.
     """
-    return read_fields([m.xml for m in members], [m.name for m in members])
+    return read_fields([m.text for m in members], [m.name for m in members])

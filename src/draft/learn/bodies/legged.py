@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from itertools import takewhile
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +19,10 @@ from draft.design import Design
 from draft.design.battery import battery
 from draft.design.legs import legs
 from draft.errors import DraftError
+from draft.laws.torque_speed import stall_torque
 from draft.learn.bodies.topology import foot_of, mirrored_joints, mirrored_legs, topology, upper_of
 from draft.metrics.speed import top_speed
+from draft.model.texts import Text, with_template
 from draft.values import Value, scalar
 
 REFERENCE_LEG = 0.48  # Thigh plus shank of the cheetah [m]; scale s = L / 0.48 m (paper).
@@ -38,7 +40,7 @@ class LeggedRobot:
 
     Attributes:
         name: name of robot and design.
-        xml: MJCF of the robot.
+        text: MJCF of the robot.
         trunk: name of the trunk.
         joints: names of the joints.
         leg_joints: indices of the joints of each leg, from the trunk outwards.
@@ -64,7 +66,7 @@ class LeggedRobot:
     """
 
     name: str
-    xml: str
+    text: Text = field(hash=False)
     trunk: str
     joints: tuple[str, ...]
     leg_joints: tuple[tuple[int, ...], ...]
@@ -87,12 +89,17 @@ class LeggedRobot:
     battery: tuple[float, ...] = ()
 
     @property
+    def xml(self) -> str:
+        """MJCF of the robot as one string."""
+        return str(self.text)
+
+    @property
     def stall_torque(self) -> tuple[float, ...]:
         """Torque of each motor at standstill without its current limit [N m]."""
         if not self.corner_speed:
             return self.peak_torque
         numbers = zip(self.peak_torque, self.no_load_speed, self.corner_speed, strict=True)
-        return tuple(peak * (speed / (speed - corner)) for peak, speed, corner in numbers)
+        return tuple(scalar(stall_torque(*of)) for of in numbers)
 
     @property
     def is_quadruped(self) -> bool:
@@ -129,23 +136,24 @@ class LeggedRobot:
         """Scale s = L / 0.48 m."""
         return self.leg_length / REFERENCE_LEG
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain data, without what is at its default: older records lack it."""
-        data = {name: getattr(self, name) for name in LeggedRobot.__dataclass_fields__}
-        return {name: x for name, x in data.items() if name not in _LATER or x != _LATER[name]}
+    def as_dict(self, text: bool = True) -> dict[str, Any]:
+        """Return plain data, with the MJCF or not, without what is at its default: see `_LATER`."""
+        data = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "text"}
+        data = {name: x for name, x in data.items() if name not in _LATER or x != _LATER[name]}
+        return {"xml": self.xml, **data} if text else data
 
     @staticmethod
-    def from_dict(data: dict[str, Any]) -> LeggedRobot:
-        """Return the quadruped of data from `as_dict`, read back from JSON.
+    def from_dict(data: dict[str, Any], text: Text | None = None) -> LeggedRobot:
+        """Return the robot of data from `as_dict`, read back from JSON, and of a text they lack.
 
         Raises:
             KeyError: an entry is missing.
         """
-        data = _LATER | data
+        data = _LATER | data | {"text": text or Text(str(data["xml"]))}
         return LeggedRobot(**{one.name: _frozen(data[one.name]) for one in fields(LeggedRobot)})
 
 
-# Defaults of the fields that were added to records that exist.
+# Defaults of the fields that were added later: older records lack them.
 _LATER: dict[str, Any] = {"corner_speed": (), "battery": ()}
 
 
@@ -172,7 +180,7 @@ def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
     sites = [foot_of(design, chain) for chain in chains]
     return LeggedRobot(
         name=name,
-        xml=model.xml,
+        text=Text(model.xml),
         trunk=design.bodies[0].name,
         joints=joints,
         leg_joints=tuple(tuple(index[joint] for joint in chain.joints) for chain in chains),
@@ -209,6 +217,12 @@ def stated_battery(design: Design) -> tuple[Value, ...]:
         return ()
     found = battery(design)
     return found.energy, *found.band
+
+
+def with_one_template(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]:
+    """Return a family whose texts have one template, as far as they differ in numbers only."""
+    texts = with_template([member.text for member in members])
+    return tuple(replace(member, text=text) for member, text in zip(members, texts, strict=True))
 
 
 def check_family(members: Sequence[LeggedRobot]) -> None:

@@ -7,6 +7,7 @@ not those of the first, by the directions of axes or the places of feet, are rea
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -63,7 +64,8 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
     """Robots of the designs that can be read by arrays because they resemble the first."""
     if not follows_mujoco() or not len(rows):
         return {}
-    if robot_texts(design, np.array([first_row])) != [first.xml]:
+    (text,) = robot_texts(design, np.array([first_row]))
+    if text != first.text:
         return {}
     home = _home(design, first)
     if home is None:
@@ -80,7 +82,7 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
     rows = batch.rows
     motors = [design.actuators[design.joints[name].actuator or ""] for name in first.joints]
     columns = {
-        "xml": robot_texts(design, rows),
+        "text": robot_texts(design, rows),
         "home": _tuples(home[rows]),
         "ranges": [tuple(map(tuple, row)) for row in ranges[rows].tolist()],
         "peak_torque": _tuples(_table(design, [m.peak_torque for m in motors])[rows]),
@@ -96,7 +98,7 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
         "mass": _column(design, design.mass, rows),
     }
     same = {name: getattr(first, name) for name in LeggedRobot.__dataclass_fields__}
-    found: Found = {}
+    found: Found = {first_row: replace(first, text=text)}
     for row, *values in zip(rows.tolist(), *columns.values(), strict=True):
         found[row] = LeggedRobot(**same | dict(zip(columns, values, strict=True)))
     return found

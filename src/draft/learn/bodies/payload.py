@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from draft.errors import DraftError
-from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.bodies.legged import LeggedRobot, with_one_template
+from draft.model.texts import Text
 from draft.model.xml import parse
 from draft.spec.payload import MASS, USUAL_DENSITY
 from draft.spec.primitives.box import BoxPart
@@ -34,7 +35,7 @@ def with_payload(
     """
     if mass == 0:
         return tuple(members)
-    return tuple(_loaded(member, mass, density) for member in members)
+    return with_one_template([_loaded(member, mass, density) for member in members])
 
 
 def _loaded(member: LeggedRobot, mass: float, density: float) -> LeggedRobot:
@@ -64,4 +65,4 @@ def _loaded(member: LeggedRobot, mass: float, density: float) -> LeggedRobot:
         conaffinity=1,
         rgba=BoxPart.colors["carried"],
     )
-    return replace(member, xml=root.text(), mass=member.mass + mass)
+    return replace(member, text=Text(root.text()), mass=member.mass + mass)

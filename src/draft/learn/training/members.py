@@ -11,40 +11,45 @@ from pathlib import Path
 
 import numpy as np
 
-from draft.learn.bodies.legged import LeggedRobot
-from draft.model.batch_text import packed, unpacked
+from draft.learn.bodies.legged import LeggedRobot, with_one_template
+from draft.model.texts import of_template
 
 MEMBERS, NUMBERS = "members.json", "members.npz"
 
 
 def robots_digest(members: Sequence[LeggedRobot]) -> str:
     """Hash that changes when any robot does."""
-    text = json.dumps([member.as_dict() for member in members], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    digest = hashlib.sha256(b"[")
+    for k, member in enumerate(members):  # One text at a time: a family's are large.
+        text = json.dumps(member.as_dict(), sort_keys=True)
+        digest.update(f"{', ' if k else ''}{text}".encode())
+    digest.update(b"]")
+    return digest.hexdigest()[:16]
 
 
 def files_of(members: Sequence[LeggedRobot]) -> dict[str, str | bytes]:
     """Files of the robots by name: the models of a family are one template and arrays."""
-    robots = [member.as_dict() for member in members]
-    found = packed([member.xml for member in members]) if len(members) > 1 else None
-    files: dict[str, str | bytes] = {}
-    if found is not None:
+    template = members[0].text.template
+    family = len(members) > 1 and all(one.text.template == template for one in members)
+    robots = [member.as_dict(text=not family) for member in members]
+    files: dict[str, str | bytes] = {MEMBERS: json.dumps(robots) + "\n"}
+    if family:
         content = io.BytesIO()
-        np.savez_compressed(content, template=np.array(found[0]), numbers=found[1])
+        numbers = np.stack([member.text.numbers for member in members])
+        np.savez_compressed(content, template=np.array(template), numbers=numbers)
         files[NUMBERS] = content.getvalue()
-        for robot in robots:
-            del robot["xml"]
-    return files | {MEMBERS: json.dumps(robots) + "\n"}
+    return files
 
 
 def read_members(folder: Path) -> tuple[LeggedRobot, ...]:
     """Robots of a run; those of an older one have their models among their numbers."""
     robots = json.loads((folder / MEMBERS).read_text(encoding="utf-8"))
-    if any("xml" not in robot for robot in robots):
-        try:
-            with np.load(io.BytesIO((folder / NUMBERS).read_bytes())) as found:
-                texts = unpacked(str(found["template"]), found["numbers"])
-        except zipfile.BadZipFile as error:
-            raise ValueError(f"{NUMBERS}: {error}") from None
-        robots = [robot | {"xml": text} for robot, text in zip(robots, texts, strict=True)]
-    return tuple(LeggedRobot.from_dict(robot) for robot in robots)
+    if all("xml" in robot for robot in robots):
+        return with_one_template([LeggedRobot.from_dict(robot) for robot in robots])
+    try:
+        with np.load(io.BytesIO((folder / NUMBERS).read_bytes())) as found:
+            texts = of_template(str(found["template"]), found["numbers"])
+    except zipfile.BadZipFile as error:
+        raise ValueError(f"{NUMBERS}: {error}") from None
+    each = zip(robots, texts, strict=True)
+    return tuple(LeggedRobot.from_dict(robot, text) for robot, text in each)

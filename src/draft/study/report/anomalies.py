@@ -100,7 +100,7 @@ def largest_efficiency(one: Evaluation) -> float | None:
     Returns:
         The bound; None if samples of a joint class are missing.
     """
-    found = one.samples()[0].get(SPEED, Samples()).plane
+    found = one.samples.get(SPEED, Samples()).plane
     if set(found) != set(CLASSES):
         return None
     low = CELL * np.arange(CELLS)

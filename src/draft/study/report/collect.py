@@ -14,7 +14,7 @@ from draft.learn.training.run import differences
 from draft.study.report import collected as files
 from draft.study.report.gather import gather
 from draft.study.report.missing import missing
-from draft.study.report.records import Evaluation, Planned, Study, Trained
+from draft.study.report.records import Planned, Study, Trained
 from draft.study.store import FILE
 
 
@@ -116,17 +116,8 @@ def _finished(study: Study, omitted: list[str]) -> Study:
             words = f"is of iteration {at:g}, not {one.run.planned}"
             omitted.append(f"{one.run.name}, {one.name}: the evaluation {words}")
         elif one.run in runs:
-            evaluations.append(_read(one, omitted))
+            evaluations.append(one)
     return replace(study, singles=tuple(runs), families=(), evaluations=tuple(evaluations))
-
-
-def _read(one: Evaluation, omitted: list[str]) -> Evaluation:
-    """Return an evaluation with its counted samples in memory."""
-    if one.arm != "nominal":
-        return one
-    found, warnings = one.samples()
-    omitted += warnings
-    return replace(one, reader=lambda _: (found, ()))
 
 
 def _merged(old: Study, new: Study) -> Study:
@@ -142,7 +133,7 @@ def _merged(old: Study, new: Study) -> Study:
         run, kept = runs[one.run.name], (one.run.name, one.name)
         if kept not in evaluations and _same_training(before[run.name], run):
             evaluations[kept] = replace(one, run=run)
-    singles = sorted(runs.values(), key=lambda r: (r.key[0], list(STAGES).index(r.stage), r.seed))
+    singles = sorted(runs.values(), key=lambda one: one.place)
     ordered = [evaluations[key] for key in sorted(evaluations)]
     planned = _joined(old.planned, new.planned)
     return replace(

@@ -192,11 +192,9 @@ def _run(one: Trained, evaluations: list[Evaluation]) -> RunFile:
 
 
 def _samples(one: Evaluation) -> dict[str, SamplesFile]:
-    """Return the counted samples of the nominal arm; the report shows no others."""
-    found = one.samples()[0] if one.arm == "nominal" else {}
     return {
         battery: SamplesFile.of(samples)
-        for battery, samples in found.items()
+        for battery, samples in one.samples.items()
         if samples.counts or samples.plane
     }
 
@@ -252,7 +250,7 @@ def read(folder: Path) -> Study:
         evaluations += [_evaluation(path, run, name, e) for name, e in file.evaluations.items()]
     if not runs:
         raise _broken(folder / RUNS, "no run is in it")
-    runs.sort(key=lambda one: (one.key[0], list(STAGES).index(one.stage), one.seed))
+    runs.sort(key=lambda one: one.place)
     return Study(study.name, tuple(runs), (), tuple(evaluations), (), study.planned)
 
 
@@ -316,7 +314,7 @@ def _evaluation(path: Path, run: Trained, name: str, file: EvaluationFile) -> Ev
         samples = {battery: cut.samples() for battery, cut in file.samples.items()}
     except ValueError:
         raise _broken(path, f"evaluations.{name}: it counts more bins than there are") from None
-    made = Evaluation(run, file.summary, lambda _: (samples, ()))
+    made = Evaluation(run, file.summary, samples)
     if made.name != name:
         raise _broken(path, f"evaluations.{name}: it is of {made.name}")
     return made

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
 
 from draft.errors import DraftError
@@ -25,7 +25,8 @@ def gather(folder: Path) -> Study:
     """Read a study's folder.
 
     Raises:
-        DraftError: the folder holds no run that can be read.
+        DraftError: the folder holds no run that can be read, or the extra that reads Parquet is
+            not installed.
     """
     warnings: list[str] = []
     found: dict[Path, Trained] = {}
@@ -42,8 +43,7 @@ def gather(folder: Path) -> Study:
         remedy = "; ".join(warnings) or "'draft study FILE.yaml' makes one"
         raise DraftError(f"'{folder}' has no run of a study to report on", remedy)
     evaluations = [one for path, run in kept.items() for one in _evaluations(path, run, warnings)]
-    stages = {stage: i for i, stage in enumerate(STAGES)}
-    runs = sorted(kept.values(), key=lambda one: (one.key[0], stages[one.key[1]], one.key[2]))
+    runs = sorted(kept.values(), key=lambda one: one.place)
     return Study(
         name=planned.name if planned else folder.resolve().name,
         singles=tuple(one for one in runs if one.single),
@@ -132,5 +132,9 @@ def _evaluations(folder: Path, run: Trained, warnings: list[str]) -> Iterator[Ev
         if summary.robots not in (None, run.robots):
             warnings.append(f"{where} is of other robots than its run; it is omitted")
             continue
-        reader = partial(samples.read, path.parent)
-        yield Evaluation(run, summary, reader)
+        one = Evaluation(run, summary)
+        if run.single and one.arm == "nominal" and one.levels:  # Pages show no other counts.
+            found, unread = samples.read(path.parent, one.levels)
+            warnings += unread
+            one = replace(one, samples=found)
+        yield one

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -58,21 +58,14 @@ class Use:
 
 
 class Utilisation:
-    """Utilisation of the designs of a study; every file is read once."""
+    """Utilisation of the designs of a study, nominal arm."""
 
     def __init__(self, study: Study) -> None:
-        """Read the counts of the nominal arm.
-
-        Raises:
-            DraftError: the extra that reads Parquet is not installed.
-        """
-        self.warnings: list[str] = []
         self._found: dict[tuple[str, str], Use] = {}
         for design in study.members:
             evaluations = [one for one in study.of(design, "nominal") if one.summary.utilisation]
-            read = {one: self._read(one) for one in evaluations}
             for battery in BATTERIES:
-                of = {one: read[one] for one in evaluations if battery in one.summary.utilisation}
+                of = [one for one in evaluations if battery in one.summary.utilisation]
                 if of:
                     self._found[design, battery] = _use(battery, of)
 
@@ -80,18 +73,13 @@ class Utilisation:
         """Return the utilisation of a design in a battery; None if it was not measured."""
         return self._found.get((design, battery))
 
-    def _read(self, one: Evaluation) -> Mapping[str, Samples]:
-        found, warnings = one.samples()
-        self.warnings += warnings
-        return found
 
-
-def _use(battery: str, read: Mapping[Evaluation, Mapping[str, Samples]]) -> Use:
+def _use(battery: str, evaluations: Sequence[Evaluation]) -> Use:
     pooled, levels = Samples(), []
-    for one, found in read.items():
+    for one in evaluations:
         if battery in one.levels:
             levels.append(one.levels[battery])
-            pooled.add(found.get(battery, Samples()))
+            pooled.add(one.samples.get(battery, Samples()))
     shares = {}
     for joint in CLASSES:
         for quantity in QUANTITIES:
@@ -101,13 +89,13 @@ def _use(battery: str, read: Mapping[Evaluation, Mapping[str, Samples]]) -> Use:
                 continue
             values = [
                 float(value)
-                for one in read
+                for one in evaluations
                 if (value := one.summary.utilisation[battery].get(joint, {}).get(quantity))
                 is not None
             ]
             if values:
                 shares[joint, quantity] = float(np.median(values))
-    return Use(pooled, shares, levels, limiting(battery, (one.summary for one in read)))
+    return Use(pooled, shares, levels, limiting(battery, (one.summary for one in evaluations)))
 
 
 def limiting(battery: str, summaries: Iterable[Measured]) -> Limit | None:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from draft.learn.bodies.legged import CLASSES
+from draft.laws.torque_speed import Line, torque_speed
+from draft.learn.bodies.legged import CLASSES, LeggedRobot
 from draft.learn.measuring.utilisation import CELL, CELLS
 from draft.study.report.labels import color, halo
 from draft.study.report.occupancy import Use, Utilisation
@@ -42,7 +43,7 @@ def figure(study: Study, battery: str, found: Mapping[str, Use], wide: float) ->
     shape: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False}
     figure, axes = plt.subplots(len(found), len(CLASSES), figsize=size, **shape)
     for row, (design, use) in zip(axes, found.items(), strict=True):
-        _row(row, use, color(study, design))
+        _row(row, use, study.members[design], color(study, design))
         row[0].set_ylabel("|torque| per peak torque")
         title = f"{study.titles[design]}: {_battery(battery, use)}"
         row[0].set_title(title, loc="left", fontweight="bold", pad=12)
@@ -58,10 +59,12 @@ def shown(study: Study, used: Utilisation, battery: str) -> dict[str, Use]:
     return {design: use for design, use in found.items() if use and use.samples.plane}
 
 
-def _row(axes: Sequence[Axes], use: Use, tint: str) -> None:
+def _row(axes: Sequence[Axes], use: Use, robot: LeggedRobot, tint: str) -> None:
     """Draw one plane for each joint class."""
     for ax, joint in zip(axes, CLASSES, strict=True):
-        _motor(ax)
+        _limits(ax)
+        for line in _lines(robot, joint):
+            ax.plot(*zip(*line, strict=True), color="0.2", linewidth=0.8, zorder=3)
         if joint in use.samples.plane:
             _density(ax, use.samples.plane[joint], _shades(tint))
         _percentiles(ax, joint, use)
@@ -121,9 +124,16 @@ def _percentiles(ax: Axes, joint: str, use: Use) -> None:
         ax.annotate(words, at, xycoords="axes fraction", fontweight=weight, **style)
 
 
-def _motor(ax: Axes) -> None:
-    """Draw the torque-speed line of the motor, and the limits of both."""
-    ax.plot([0, 1], [1, 0], color="0.2", linewidth=0.8, zorder=3)
+def _lines(robot: LeggedRobot, joint: str) -> set[Line]:
+    """Torque-speed lines of the motors of a joint class, as shares of their limits."""
+    corners = robot.corner_speed or (0.0,) * len(robot.joints)
+    shares = [corner / speed for corner, speed in zip(corners, robot.no_load_speed, strict=True)]
+    classes = zip(robot.joint_classes, shares, strict=True)
+    return {torque_speed(1.0, 1.0, at) for k, at in classes if robot.classes[k] == joint}
+
+
+def _limits(ax: Axes) -> None:
+    """Draw the limits of torque and speed."""
     for line in (ax.axvline, ax.axhline):
         line(1, color="0.85", linewidth=0.6, zorder=0)
     ax.set_xlim(0, TOP)

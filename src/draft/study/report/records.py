@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.measuring.summary import ARMS, PROTOCOLS, Arm, Protocol, Summary
 from draft.learn.measuring.utilisation import BINS, CELLS
+from draft.learn.task.config import STAGES
 from draft.learn.training.members import robots_digest
 from draft.learn.training.progress import Row
 from draft.values import Array
@@ -37,10 +38,6 @@ class Samples:
             self.counts[key] = self.counts.get(key, np.zeros(BINS)) + counts
         for joint, cells in other.plane.items():
             self.plane[joint] = self.plane.get(joint, np.zeros((CELLS, CELLS))) + cells
-
-
-# Samples by battery, and warnings about files that cannot be read.
-Read = tuple[Mapping[str, Samples], Sequence[str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +99,11 @@ class Trained:
         return self.members[0].name, self.stage, self.seed
 
     @property
+    def place(self) -> tuple[str, int, int]:
+        """Place among other runs: by design, stage and seed."""
+        return self.members[0].name, list(STAGES).index(self.stage), self.seed
+
+    @property
     def single(self) -> bool:
         """Whether it has one design."""
         return len(self.members) == 1
@@ -119,12 +121,12 @@ class Evaluation:
     Attributes:
         run: the run.
         summary: its summary.
-        reader: reads its counted samples at levels by battery.
+        samples: its counted samples by battery, if it is of the nominal arm and one design.
     """
 
     run: Trained
     summary: Summary
-    reader: Callable[[Mapping[str, float]], Read]
+    samples: Mapping[str, Samples] = field(default_factory=dict)
 
     @property
     def arm(self) -> Arm:
@@ -152,10 +154,6 @@ class Evaluation:
             if level is not None:
                 found[battery] = level
         return found
-
-    def samples(self) -> Read:
-        """Return counted samples by battery at these levels, and warnings."""
-        return self.reader(self.levels)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from draft.extras import need
 from draft.learn.bodies.legged import CLASSES
 from draft.learn.measuring.results import OCCUPANCY, UTILISATION
 from draft.learn.measuring.utilisation import BINS, CELLS, QUANTITIES
-from draft.study.report.records import Read, Samples
+from draft.study.report.records import Samples
 from draft.values import Array
 
 COLUMNS = {
@@ -24,7 +24,7 @@ WORDS = ("battery", "joint", "quantity")
 Columns = dict[str, Any]
 
 
-def read(folder: Path, levels: Mapping[str, float]) -> Read:
+def read(folder: Path, levels: Mapping[str, float]) -> tuple[dict[str, Samples], list[str]]:
     """Read the counted samples of an evaluation.
 
     Args:

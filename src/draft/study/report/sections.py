@@ -84,7 +84,6 @@ class Contents:
         study: records of the study.
         tables: tables by name.
         pictures: figures that were drawn, by section.
-        warnings: what was omitted.
         source: place of the results; None for a page on the folder of a study.
     """
 
@@ -93,11 +92,10 @@ class Contents:
         study: Study,
         tables: Mapping[str, Table],
         pictures: Mapping[str, Sequence[Picture]],
-        warnings: Sequence[str] = (),
         source: Source | None = None,
     ) -> None:
         self.study, self.tables, self.pictures = study, tables, pictures
-        self.warnings, self.source = warnings, source
+        self.source = source
 
     def page(self) -> Page:
         """Return the page; sections without content are left out."""
@@ -153,8 +151,8 @@ class Contents:
         if absent := missing(study):
             parts = "1 part is" if len(absent) == 1 else f"{len(absent)} parts are"
             yield Paragraph(f"Not complete: {parts} missing, see the end.", "warning")
-        if self.warnings:
-            yield Items(self.warnings, "Omitted from this report:", "warning")
+        if self.study.warnings:
+            yield Items(self.study.warnings, "Omitted from this report:", "warning")
         yield from self._tables("designs")
 
     def _arms(self) -> str:

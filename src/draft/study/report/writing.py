@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -66,7 +67,6 @@ def _fill(study: Study, folder: Path) -> None:
     place = folder / "figures"
     save(place, {one.name: one.make for one in drawings}, DPI, KINDS)
     pictures = _pictures(drawings, place, "svg")
-    warnings = [*study.warnings, *used.warnings]
     if study.members:
         try:
             picture = partial(robots.figure, study, *robots.render(list(study.members.values())))
@@ -74,8 +74,9 @@ def _fill(study: Study, folder: Path) -> None:
             words = "Home poses at true relative size."
             pictures["robots"] = [Picture("robots", words, place / "robots.png", words)]
         except DraftError as error:
-            warnings += [f"the picture of the robots: {p.cause}" for p in error.problems]
-    page = Contents(study, tables, pictures, warnings).page()
+            unseen = [f"the picture of the robots: {p.cause}" for p in error.problems]
+            study = replace(study, warnings=(*study.warnings, *unseen))
+    page = Contents(study, tables, pictures).page()
     write_file(folder / PAGE, html(page))
 
 
@@ -128,6 +129,6 @@ def write_page(
             figures.shrink(path)
     pictures = _pictures(drawings, images, "png")
     source = Source(folder, page, beside)
-    contents = Contents(study, all_tables(study, used), pictures, (), source)
+    contents = Contents(study, all_tables(study, used), pictures, source)
     write_file(page, markdown(contents.page(), page.parent))
     return [page, *(images / path.name for path in found)]

@@ -1,0 +1,104 @@
+"""A payload in an evaluation is the payload of the design, on a robot trained without it."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+import draft
+from draft.errors import DraftError
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.bodies.payload import with_payload
+from draft.learn.measuring import evaluation
+from draft.learn.measuring.evaluation_options import Options
+from draft.learn.measuring.levels import batteries
+from draft.learn.measuring.results import Request, make_request, result_folder
+from draft.learn.training.run import create
+from draft.model.texts import Text
+from tests.learn.small import member, plan
+
+
+@pytest.mark.parametrize("label", ["cheetah", "bear", "giraffe"])
+def test_the_block_is_that_of_the_design_with_a_payload(label: str) -> None:
+    design = draft.load("quadruped").resolve(label, {"payload": 10})
+    expected = design.build().mujoco
+    (robot,) = with_payload([member(label)], 10)
+    model = mujoco.MjModel.from_xml_string(robot.xml)
+    assert robot.mass == pytest.approx(float(design.mass))
+    names = [expected.body(i).name for i in range(expected.nbody)]
+    assert [model.body(i).name for i in range(model.nbody)] == names
+    for field in ("body_mass", "body_inertia", "body_ipos", "body_parentid", "geom_size"):
+        ours, theirs = getattr(model, field), getattr(expected, field)
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12, err_msg=field)
+
+
+def test_nothing_else_changes_and_no_mass_is_no_block() -> None:
+    (robot,) = with_payload([member()], 10)
+    assert replace(robot, text=Text(""), mass=0.0) == replace(member(), text=Text(""), mass=0.0)
+    assert with_payload([member()], 0) == (member(),)
+
+
+def test_a_second_payload_has_a_name_of_its_own() -> None:
+    ((robot,)) = with_payload(with_payload([member()], 3), 4)
+    model = mujoco.MjModel.from_xml_string(robot.xml)
+    assert model.body("payload").mass[0] == pytest.approx(3)
+    assert model.body("payload_").mass[0] == pytest.approx(4)
+
+
+@pytest.mark.parametrize("xml", ["<mujoco> </mujoco>", '<mujoco model="x"/>'])
+def test_a_model_that_draft_did_not_write_is_refused(xml: str) -> None:
+    odd = replace(member(), text=Text(xml))
+    assert with_payload([odd], 0) == (odd,)
+    with pytest.raises(DraftError, match="is not as this version of Draft writes it"):
+        with_payload([odd], 10)
+
+
+def test_a_result_with_a_payload_is_beside_that_without(tmp_path: Path) -> None:
+    run = create(tmp_path / "run", plan(), {})
+    (run.folder / "model_1.pt").write_bytes(b"weights")
+    walk = batteries(("walk",))
+
+    def asked(**more: Any) -> Request:
+        return make_request(run, walk, Options(replicas=2, seconds=1.0, **more))
+
+    bare = asked()
+    assert not {"payload", "regeneration"} & bare.as_dict().keys()
+    assert result_folder(run, bare) == run.folder / "evaluation/nominal-walking"
+    loaded = asked(payload=10.0, regeneration=0.5)
+    assert loaded.as_dict()["payload"] == 10.0
+    folder = result_folder(run, loaded)
+    assert folder == run.folder / "evaluation-payload-10kg-regeneration-0.5/nominal-walking"
+    assert result_folder(run, asked(payload=2.5), tmp_path) == (
+        tmp_path / "run-payload-2.5kg/nominal-walking"
+    )
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        ({"payload": -1.0}, "`payload` -1 is not a number from 0 to 10000 kg"),
+        ({"payload": float("nan")}, "`payload` nan is not a number from 0"),
+        ({"regeneration": 1.5}, "`regeneration` 1.5 is not a number from 0 to 1"),
+    ],
+)
+def test_bad_numbers_are_refused(numbers: dict[str, float], said: str) -> None:
+    with pytest.raises(DraftError, match=said):
+        Options.of(numbers)
+
+
+def test_the_trial_runs_the_loaded_robot(tmp_path: Path) -> None:
+    pytest.importorskip("mjlab")
+    from draft.learn.measuring.rollout.trial import trial
+
+    run = create(tmp_path / "run", plan(), {})
+    (run.folder / "model_1.pt").write_bytes(b"weights")
+    prepared = evaluation.prepare(run, Options(battery=["walk"], replicas=2, payload=10.0))
+    robots: tuple[LeggedRobot, ...] = trial(run, prepared.batteries, prepared.request).task.members
+    assert [robot.mass for robot in robots] == [pytest.approx(member().mass + 10)]
