@@ -24,6 +24,7 @@ import draft
 from benchmarks.rows import measured, publish, timed
 from draft.explore.engines import Engine, LocalEngine, RayEngine
 from draft.explore.job import Job, make
+from draft.explore.settings import Sampled
 from draft.explore.sweep import chunk, run_sweep
 
 VARY = (
@@ -130,7 +131,7 @@ def _cpu(work: Callable[[], Any]) -> float:
 def sweeps(folder: Path) -> list[dict[str, Any]]:
     """Compiled models with M(q) metrics, all accepted; alone, by two processes, and on Ray."""
     spec = draft.load("quadruped")
-    job = make(spec, "sweep", BUILT, SWEPT, chunk=chunk(SWEPT))
+    job = make(spec, "sweep", Sampled(vary=BUILT, n=SWEPT), chunk(SWEPT))
     cpu = SWEPT / _cpu(lambda: run_sweep(job, folder / "cpu", LocalEngine(1)))
     rates = {name: _rate(job, folder / name, engine) for name, engine in _engines()}
     if "--ray" in sys.argv:

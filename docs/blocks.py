@@ -24,12 +24,14 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
 ARGUMENTS_ONLY, SHOWN = "arguments only", "shown"
+# Python of an environment: called with its arguments, the current folder, environment variables.
+Python = Callable[[Sequence[str], Path, dict[str, str]], subprocess.CompletedProcess[str]]
 _BLOCK = re.compile(r"(?:^<!-- ([\w ]+) -->\n+)?^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _FILE = re.compile(r'# ([\w./-]+\.\w+)(?:, (below|instead of) "(.+)")?$')
 
@@ -70,13 +72,13 @@ def commands(block: Block) -> Iterator[list[str]]:
             yield words
 
 
-def follow(page: Path, folder: Path, python: Path | None = None) -> None:
+def follow(page: Path, folder: Path, python: Python | None = None) -> None:
     """Do what a page says in a folder, which becomes the current one meanwhile.
 
     Args:
         page: the page.
         folder: the folder.
-        python: Python of the environment in which commands and code run; None for this process.
+        python: Python of the environment in which commands and code run; None for this one.
 
     Raises:
         BlockError: a command fails, prints something else, or a file does not have the line.
@@ -90,7 +92,7 @@ def follow(page: Path, folder: Path, python: Path | None = None) -> None:
                 raise BlockError(f"{page.name}:{block.line}: {error}") from error
 
 
-def _do(block: Block, printed: str, python: Path | None) -> str:
+def _do(block: Block, printed: str, python: Python | None) -> str:
     """Do what a block says; return what it printed."""
     if block.mark == SHOWN:
         return printed
@@ -106,13 +108,13 @@ def _do(block: Block, printed: str, python: Path | None) -> str:
     return printed
 
 
-def run(words: Sequence[str], arguments_only: bool = False, python: Path | None = None) -> str:
+def run(words: Sequence[str], arguments_only: bool = False, python: Python | None = None) -> str:
     """Run a command, or only check its arguments; return what it printed.
 
     Args:
         words: the command.
         arguments_only: check its arguments.
-        python: Python of the environment to run it in; None for this process.
+        python: Python of the environment to run it in; None for this one.
 
     Raises:
         BlockError: it is none that pages use, or it fails.
@@ -207,7 +209,7 @@ def write(text: str) -> None:
     path.write_text("".join(lines), encoding="utf-8")
 
 
-def run_python(block: Block, python: Path | None = None) -> str:
+def run_python(block: Block, python: Python | None = None) -> str:
     """Run a block of Python in the current folder, and return what it prints.
 
     A block whose first line names a file is written there and stays.
@@ -223,23 +225,30 @@ def run_python(block: Block, python: Path | None = None) -> str:
             path.unlink()
 
 
-def _script(words: Sequence[str], python: Path | None, codes: Sequence[int] = (0,)) -> str:
-    own = str(python or sys.executable)
-    # Scripts that call `draft` find the one of this environment.
-    path = os.pathsep.join([os.path.dirname(own), os.environ.get("PATH", "")])
-    environment = os.environ | {
-        "PATH": path,
-        "PYTHONWARNINGS": "ignore",
-        "PYTHONIOENCODING": "utf-8",
-    }
-    done = subprocess.run(
-        [own, *words], capture_output=True, encoding="utf-8", env=environment, check=False
-    )
+def _script(words: Sequence[str], python: Python | None, codes: Sequence[int] = (0,)) -> str:
+    environment = os.environ | {"PYTHONWARNINGS": "ignore", "PYTHONIOENCODING": "utf-8"}
+    done = (python or _here)(words, Path.cwd(), environment)
     if done.returncode not in codes:
         raise BlockError(
             f"'python {shlex.join(words)}' ends with {done.returncode}:\n{done.stderr}"
         )
     return done.stdout + (done.stderr if python else "")
+
+
+def _here(
+    words: Sequence[str], folder: Path, environment: dict[str, str]
+) -> subprocess.CompletedProcess[str]:
+    """Run this Python with arguments."""
+    # Scripts that call `draft` find the one of this environment.
+    path = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", "")])
+    return subprocess.run(
+        [sys.executable, *words],
+        cwd=folder,
+        capture_output=True,
+        encoding="utf-8",
+        env=environment | {"PATH": path},
+        check=False,
+    )
 
 
 def _compare(text: str, printed: str) -> None:

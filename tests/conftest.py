@@ -52,6 +52,19 @@ SLOW = (
     "studio/test_studio_browser.py",
     "test_ray.py",
 )
+# Files that take longest, which begin: a long one at the end would run alone, on one core.
+LONGEST = (
+    "test_site.py",
+    "studio/test_studio_browser.py",
+    "explore/test_resumed_search.py",
+    "learn/measuring/test_surface.py",
+    "cli/test_train.py",
+    "learn/engine/test_ranks.py",
+    "learn/engine/test_family.py",
+    "learn/training/test_training.py",
+    "reporting/test_browser.py",
+    "test_architecture.py",
+)
 # PyTorch, MuJoCo Warp and a browser take up to 3 GB in each process.
 MOST_PROCESSES = 4
 
@@ -67,11 +80,12 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what is slow, and begin with it: a long file at the end would run alone."""
+    """Mark what is slow, and begin with what takes longest."""
     for item in items:
         if _is_slow(item.path):
             item.add_marker(pytest.mark.slow)
-    items.sort(key=lambda item: not _is_slow(item.path))
+    first = {HERE / name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: (first.get(item.path, len(first)), not _is_slow(item.path)))
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:

@@ -18,8 +18,26 @@ import pytest
 from packaging.requirements import Requirement
 
 from draft.extras import DISTRIBUTION, required
+from tests.warm import Warm
 
 _NOT_LINKED = {"..", "__pycache__"}  # Scripts, whose first line names an environment.
+
+
+_kept: dict[tuple[frozenset[str], frozenset[str]], Warm] = {}
+
+
+def warm(kept: pytest.TempPathFactory, extras: Iterable[str], also: Iterable[str] = ()) -> Warm:
+    """The warm Python of an environment, which all tests of this process share.
+
+    Args:
+        kept: where it is made the first time.
+        extras: extras of Draft.
+        also: other packages.
+    """
+    key = frozenset(extras), frozenset(also)
+    if key not in _kept:
+        _kept[key] = Warm(environment(kept.mktemp("environment") / "environment", *key))
+    return _kept[key]
 
 
 def environment(folder: Path, extras: Iterable[str], also: Iterable[str] = ()) -> Path:

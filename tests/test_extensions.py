@@ -22,6 +22,7 @@ from draft.extensions import ExtensionWarning, Registry, load
 from draft.laws.actuators import ACTUATOR_LAWS
 from draft.metrics import METRICS, of_design, of_model
 from draft.model.exporters import EXPORTERS
+from draft.spec.jsonschema import SCHEMAS, schema_text
 from draft.spec.primitives import LINKS
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "extension"
@@ -219,12 +220,12 @@ def test_a_check_refuses_designs_one_by_one_unless_allowed(install: Install) -> 
     install("ext_check", CHECK.format(error=True, mask="design.mass > 5", kind="too_heavy"))
     spec = draft.load("hopper")
     many = spec.resolve({"thigh_length": np.array([0.15, 0.3])})
-    assert [*many.accepted] == [bool(x < 5) for x in many.mass]
+    assert np.array_equal(many.accepted, np.asarray(many.mass) <= 5)
     assert kinds()["too_heavy"] == "The robot is heavier than a hand can lift"
     files = {name: file.read_bytes() for name, file in spec.files.items()}
     files["parameters.yaml"] += b"\nallow: [too_heavy]\n"
     allowed = draft.Spec.parse(files).resolve({"thigh_length": np.array([0.15, 0.3])})
-    assert allowed.accepted.all()
+    assert np.all(allowed.accepted)
     assert "too_heavy" in {finding.id for finding in allowed.findings}
 
 
@@ -232,7 +233,7 @@ def test_screens_have_a_bit_for_each_check(install: Install, tmp_path: Path) -> 
     pq = pytest.importorskip("pyarrow.parquet")
     install("ext_check", CHECK.format(error=True, mask="design.mass > 0", kind="too_heavy"))
     out = tmp_path / "out.parquet"
-    draft.screen("hopper", {"thigh_length": (0.15, 0.3)}, n=8, out=out, workers=1)
+    draft.screen("hopper", vary={"thigh_length": (0.15, 0.3)}, n=8, out=out, workers=1)
     table = pq.read_table(out)
     assert set(table["refused_by"].to_pylist()) == {"too_heavy"}
     bit = 1 << [*kinds()].index("too_heavy")
@@ -389,6 +390,15 @@ def test_a_script_adds_a_primitive_after_a_robot_was_read(
         design = draft.Spec.parse({**files, "tree.yaml": tree}).resolve()
         assert design.bodies[-1].link.end is not None
         assert isinstance(design.bodies[-1].link.end, pad.PadPart)
+        # Below every other link too.
+        models = json.loads(schema_text("tree"))["$defs"]
+        children = [
+            one["properties"]["children"]
+            for one in models.values()
+            if "name" in one.get("properties", {}) and "children" in one["properties"]
+        ]
+        assert len(children) == len(LINKS) + 1
+        assert all("#/$defs/PadLink" in json.dumps(one) for one in children)
     finally:
         for registry in extensions._REGISTRIES:
             registry.drop("draft_example", ())
@@ -396,6 +406,7 @@ def test_a_script_adds_a_primitive_after_a_robot_was_read(
             del sys.modules[name]
     with pytest.raises(draft.SpecError, match="unknown value 'pad'"):
         draft.Spec.parse({**files, "tree.yaml": tree})
+    assert schema_text("tree") == (SCHEMAS / "tree.json").read_text()
 
 
 # --- in processes of their own ---------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -10,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from docs import blocks
-from tests.environments import environment
+from tests.environments import warm
+from tests.warm import Warm
 
 TABLE = blocks.DOCS / "reference" / "installing.md"
 VARY = "quadruped --vary thigh_length=0.2:0.3"
@@ -67,23 +69,20 @@ def row(extra: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def python(tmp_path_factory: pytest.TempPathFactory) -> Warm:
     """Python of an environment without extras."""
-    return environment(tmp_path_factory.mktemp("none") / "environment", ())
+    return warm(tmp_path_factory, ())
 
 
-def run(python: Path, folder: Path, command: str) -> subprocess.CompletedProcess[str]:
+def run(python: Warm, folder: Path, command: str) -> subprocess.CompletedProcess[str]:
     blocks.copy_examples(folder)
-    words = [str(python), "-m", "draft", *shlex.split(command)]
-    return subprocess.run(
-        words, cwd=folder, capture_output=True, encoding="utf-8", timeout=300, check=False
-    )
+    return python(["-m", "draft", *shlex.split(command)], folder, dict(os.environ))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("extra", NEEDS)
 def test_a_command_without_its_extra_names_it_and_leaves_no_file(
-    extra: str, python: Path, tmp_path: Path
+    extra: str, python: Warm, tmp_path: Path
 ) -> None:
     for number, (word, command) in enumerate(NEEDS[extra].items()):
         assert word in row(f"`{extra}`")
@@ -95,7 +94,7 @@ def test_a_command_without_its_extra_names_it_and_leaves_no_file(
 
 
 @pytest.mark.slow
-def test_the_commands_that_need_no_extra_work_without_one(python: Path, tmp_path: Path) -> None:
+def test_the_commands_that_need_no_extra_work_without_one(python: Warm, tmp_path: Path) -> None:
     # `view` opens a window.
     assert set(re.findall(r"`[\w ]+`", row("none"))) == FREE.keys() | {"`view`"}
     for number, command in enumerate(FREE.values()):

@@ -58,7 +58,7 @@ def test_a_cluster_does_jobs_of_studies(cluster: Any, tmp_path: Path) -> None:
     ray.init(address=cluster.address, log_to_driver=False, logging_level="ERROR")
     try:
         worker = RayWorker(ray, gpus=0)
-        worker.start(ReportRequest("nowhere"), tmp_path / "a.log")
+        worker.start(ReportRequest(study="nowhere"), tmp_path / "a.log")
         while (code := worker.poll()) is None:
             time.sleep(0.02)
         assert code == 2

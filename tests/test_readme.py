@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from docs import blocks
-from tests.environments import environment
+from tests.environments import warm
 
 README = Path(__file__).resolve().parents[1] / "README.md"
 # Commands that open a window, learn for minutes or render videos: only arguments are checked.
@@ -41,7 +41,9 @@ def test_the_arguments_of_every_command_are_right() -> None:
 
 @pytest.mark.slow
 def test_the_commands_run_in_order_with_the_extras_that_each_names(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (tmp_path / "folder").mkdir()
     blocks.copy_examples(tmp_path / "folder")
@@ -50,8 +52,7 @@ def test_the_commands_run_in_order_with_the_extras_that_each_names(
         command = _of_draft(words)
         if command and command[0] in ARGUMENTS_ONLY:
             continue
-        extras = sorted(blocks.extras(words))
-        blocks.run(words, python=environment(tmp_path / "-".join(["env", *extras]), extras))
+        blocks.run(words, python=warm(tmp_path_factory, blocks.extras(words)))
 
 
 def test_the_python_code_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from docs import blocks, generated_pages
 from draft.cli import COMMANDS, functions
 from draft.metrics import METRICS
 from draft.metrics.capabilities import CAPABILITIES
-from tests.environments import environment
+from tests.environments import warm
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -62,13 +62,15 @@ def _python(*words: str, folder: Path) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", NEEDS)
-def test_a_page_works_as_written_in_an_empty_folder(page: str, tmp_path: Path) -> None:
+def test_a_page_works_as_written_in_an_empty_folder(
+    page: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
     for extra in NEEDS[page]:
         assert re.search(rf"extra (`{extra}`|{extra}\b)", text)
     for package in ALSO.get(page, ()):
         assert f"pip install {package}" in text
-    python = environment(tmp_path / "environment", NEEDS[page], ALSO.get(page, ()))
+    python = warm(tmp_path_factory, NEEDS[page], ALSO.get(page, ()))
     (tmp_path / "folder").mkdir()
     blocks.copy_examples(tmp_path / "folder")
     blocks.follow(DOCS / f"{page}.md", tmp_path / "folder", python)

@@ -27,7 +27,9 @@ from draft.errors import (
 if TYPE_CHECKING:
     from draft import extend, metrics, study
     from draft.design import Design, Finding
-    from draft.explore.runs import optimise, screen, sweep
+    from draft.explore.optimise import optimise
+    from draft.explore.screen import screen
+    from draft.explore.sweep import sweep
     from draft.imports.importer import import_robot
     from draft.learn.measuring.evaluation import evaluate
     from draft.learn.measuring.surface import surface
@@ -81,14 +83,14 @@ _MODULES = {
     "export": "draft.model.export",
     "import_robot": "draft.imports.importer",
     "load": "draft.spec",
-    "optimise": "draft.explore.runs",
+    "optimise": "draft.explore.optimise",
     "play": "draft.learn.policy.playback",
     "policy": "draft.learn.policy.policy",
     "report": "draft.reporting.report",
-    "screen": "draft.explore.runs",
+    "screen": "draft.explore.screen",
     "shipped": "draft.spec",
     "surface": "draft.learn.measuring.surface",
-    "sweep": "draft.explore.runs",
+    "sweep": "draft.explore.sweep",
     "train": "draft.learn.training.train",
 }
 

@@ -13,7 +13,6 @@ import warnings
 from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from draft.errors import DraftError
@@ -213,15 +212,15 @@ def _entries() -> list[EntryPoint]:
 def _loaded(entry: EntryPoint) -> Extension:
     """Import the module of an extension, or undo what it registered and say why."""
     package, version = (entry.dist.name, entry.dist.version) if entry.dist else ("", "")
-    modules, items = {*sys.modules}, [{*registry._items} for registry in _REGISTRIES]
+    modules, items = {*sys.modules}, {id(one): {*one._items} for one in _REGISTRIES}
     try:
         entry.load()
     # Whatever an extension raises is its author's fault, and must not end Draft.
     except (Exception, SystemExit) as error:
         root = _root(entry.module)
         # Its import may have made registries, whose items of Draft stay.
-        for registry, kept in zip_longest(_REGISTRIES, items, fillvalue=set[str]()):
-            registry.drop(root, kept)
+        for registry in _REGISTRIES:
+            registry.drop(root, items.get(id(registry), ()))
         # Another extension of the package registers again what this one imported.
         for name in {*sys.modules} - modules:
             if _root(name) == root:

@@ -164,7 +164,7 @@ def test_ctrl_c_says_what_is_kept_and_how_to_go_on(
         raise KeyboardInterrupt
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(f"draft.explore.runs.{called}", interrupt)
+    monkeypatch.setattr(f"draft.explore.{called}.{called}", interrupt)
     assert main(words.split()) == 130
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("interrupted: ")

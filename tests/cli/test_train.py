@@ -15,7 +15,7 @@ from draft.files import lock
 from tests.written import edit, write_robot
 
 SMALL = (
-    # Several processes are tests/learn/test_ranks.py's.
+    # Several processes are tests/learn/engine/test_ranks.py's.
     *("--envs", "4", "--device", "cpu", "--replicas", "1", "--ground", "uneven", "--set"),
     *("learning.steps=4", "learning.hidden=16,16", "ground.rows=4", "ground.border=2"),
 )
@@ -31,7 +31,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def brief_review(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The review after a training lasts one second; that it is whole is the first test's."""
+    """The review after a training lasts one second instead of eight."""
     pytest.importorskip("mjlab")
     from draft.learn.measuring.rollout import review
 
@@ -39,6 +39,7 @@ def brief_review(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @needs_mjlab
+@pytest.mark.usefixtures("brief_review")
 def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixture[str]) -> None:
     command = ["train", "cheetah", "--iterations", "2", *SMALL]
     assert main([*command, "--minutes", "1e-9"]) == 0

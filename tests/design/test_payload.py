@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import draft
 from draft.cli import main
 from draft.explore import job
+from draft.explore.settings import Sampled
 from draft.metrics import METRICS, of_design, payload_for
 from draft.spec.payload import USUAL_DENSITY
 from tests.helpers import parameter, robot
@@ -160,19 +161,12 @@ def test_a_payload_twice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_screen_draws_robots_with_their_load() -> None:
     pytest.importorskip("scipy")
-    words = ["thigh_length=0.2:0.3"]
-    made = job.make(
-        QUADRUPED,
-        "screen",
-        words,
-        8,
-        values={"payload": 10.0},
-        condition="payload_rated > 10 and payload == 10",
-        chunk=8,
-    )
+    bare = Sampled(vary={"thigh_length": (0.2, 0.3)}, n=8)
+    where = "payload_rated > 10 and payload == 10"
+    loaded = bare.model_copy(update={"values": {"payload": 10.0}, "where": where})
+    made = job.make(QUADRUPED, "screen", loaded, 8)
     design = made.resolve(made.draw(0, 8))
-    bare = job.make(QUADRUPED, "screen", words, 8, chunk=8)
-    expected = np.asarray(bare.resolve(bare.draw(0, 8)).mass) + 10
+    expected = np.asarray(QUADRUPED.resolve(made.draw(0, 8)).mass) + 10
     assert np.asarray(design.mass) == pytest.approx(expected)
     condition = made.condition()
     assert condition is not None
@@ -181,6 +175,6 @@ def test_a_screen_draws_robots_with_their_load() -> None:
 
 def test_a_payload_can_be_varied() -> None:
     pytest.importorskip("scipy")
-    made = job.make(QUADRUPED, "screen", ["payload=0:20"], 4, chunk=4)
+    made = job.make(QUADRUPED, "screen", Sampled(vary=["payload=0:20"], n=4), 4)
     drawn = made.draw(0, 4)
     assert np.asarray(made.resolve(drawn).payload_mass) == pytest.approx(drawn["payload"])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import draft
 from draft.errors import DraftError
-from draft.explore.runs import screen
+from draft.explore.screen import screen
 from draft.metrics import METRICS
 from draft.spec.relative import merged
 from draft.studio.library import Library
@@ -128,7 +128,7 @@ def test_a_screen_scales_the_value_of_its_design(tmp_path: Path) -> None:
     bear = QUADRUPED.resolve("bear")
     rows = screen(
         bear,
-        {TORQUE: (60.0, 70.0)},
+        vary={TORQUE: (60.0, 70.0)},
         out=tmp_path / "rows.parquet",
         n=4,
         metrics=["leg_length"],

@@ -14,6 +14,7 @@ import draft
 from draft.design import Design
 from draft.explore.engines import LocalEngine, Work
 from draft.explore.job import Job, make
+from draft.explore.settings import Sampled
 from draft.metrics import METRICS, Metric
 
 # All tests that use this need the extra; without it they are skipped.
@@ -24,10 +25,11 @@ VARY = ("thigh_length=0.2:0.5", "actuators.leg.peak_torque=20:300:log")
 HERE = LocalEngine(1)
 
 
-def job(spec: draft.Spec, n: float = 1000, kind: str = "screen", **changes: Any) -> Job:
+def job(spec: draft.Spec, n: int = 1000, kind: str = "screen", **changes: Any) -> Job:
     """A run of a few parts over two axes."""
-    options: dict[str, Any] = {"chunk": 100, "words": VARY, "metrics": (), **changes}
-    return make(spec, kind, options.pop("words"), n, **options)
+    chunk = changes.pop("chunk", 100)
+    settings = Sampled.of({"vary": VARY, "n": n, "metrics": (), **changes})
+    return make(spec, kind, settings, chunk)
 
 
 def rows(path: Path) -> list[dict[str, Any]]:

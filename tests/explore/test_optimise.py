@@ -18,7 +18,7 @@ import draft
 from draft.cli import main
 from draft.explore import goals
 from draft.explore.front import Entry, best
-from draft.explore.optimise import Search, evaluate, first_designs
+from draft.explore.search import Search, evaluate, first_designs
 from draft.explore.storage import FILE, STUDY, SqliteLog
 from draft.extras import remedy
 from draft.metrics import of_design
@@ -44,7 +44,7 @@ def test_the_best_are_those_that_no_other_beats(rows: list[tuple[int, ...]]) -> 
 
 def search(*subject_to: str, **changes: Any) -> Search:
     wanted = goals.goals(SPEC, ["leg.mass"], ["thigh_length"])
-    one = job(SPEC, kind="optimise", words=VARY)
+    one = job(SPEC, kind="optimise", vary=VARY)
     return Search(one, wanted, goals.constraints(SPEC, subject_to), **{"trials": 100, **changes})
 
 
@@ -156,7 +156,7 @@ def test_goals_may_need_models(
         (("--minimise", "leg.mass", "--maximise", "leg.mass"), "'leg.mass' is given twice"),
         ((*GOALS, "--subject-to", "leg.mass <"), "--subject-to:1:11: "),
         ((*GOALS, "--subject-to", "accepted and lg.mass"), "--subject-to:1:14: unknown actuator"),
-        ((*GOALS, "--trials", "0"), "--trials 0 is not from 1 to 1000000"),
+        ((*GOALS, "--trials", "0"), "--trials 0 is not a whole number from 1 to 1000000"),
         ((*GOALS, "--storage", "nowhere://x"), "cannot open the study at 'nowhere://x'"),
         ((*GOALS, "--out", "robot/tree.yaml"), "cannot write robot/tree.yaml: file exists"),
     ],

@@ -24,7 +24,8 @@ from draft.design.findings import note
 from draft.explore.engines import LocalEngine
 from draft.explore.job import opened
 from draft.explore.parquet_parts import Parts, about
-from draft.explore.screen import CHUNK, run_screen, verdict
+from draft.explore.rows import verdict
+from draft.explore.screen import CHUNK, run_screen
 from draft.extras import remedy
 from draft.laws import actuators
 from draft.spec.load import ROBOTS
@@ -36,7 +37,7 @@ SPEC = draft.load("quadruped")
 
 def test_the_rows_are_those_of_one_resolve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     metric(monkeypatch)
-    one = job(SPEC, metrics=None, words=VARY)
+    one = job(SPEC, metrics=None, vary=VARY)
     summary = run_screen(one, tmp_path / "s.parquet", HERE)
     design = SPEC.resolve(one.draw(0, one.n))
     table = pq.read_table(tmp_path / "s.parquet")
@@ -53,10 +54,10 @@ def test_the_rows_are_those_of_one_resolve(tmp_path: Path, monkeypatch: pytest.M
 
 def test_rows_that_fail_the_condition_are_dropped_and_counted(tmp_path: Path) -> None:
     out = tmp_path / "s.parquet"
-    summary = run_screen(job(SPEC, condition="accepted and leg.mass < 2"), out, HERE)
+    summary = run_screen(job(SPEC, where="accepted and leg.mass < 2"), out, HERE)
     assert summary["rows"] + summary["dropped"] == summary["designs"] == 1000
     assert 0 < summary["rows"] == len(rows(out)) == summary["accepted"]
-    none = run_screen(job(SPEC, condition="leg.mass < 0"), tmp_path / "none.parquet", HERE)
+    none = run_screen(job(SPEC, where="leg.mass < 0"), tmp_path / "none.parquet", HERE)
     assert (none["rows"], rows(tmp_path / "none.parquet")) == (0, [])
 
 
@@ -65,10 +66,10 @@ def test_rows_that_are_kept_are_those_of_a_screen_that_keeps_all(
     tmp_path: Path, share: float
 ) -> None:
     """Whether few or many are kept, which are measured in two ways."""
-    run_screen(job(SPEC, metrics=None, words=VARY), tmp_path / "all.parquet", HERE)
+    run_screen(job(SPEC, metrics=None, vary=VARY), tmp_path / "all.parquet", HERE)
     everything = pq.read_table(tmp_path / "all.parquet")
     limit = float(np.quantile(everything["mass"], share))
-    some = job(SPEC, metrics=None, words=VARY, condition=f"mass < {limit!r}")
+    some = job(SPEC, metrics=None, vary=VARY, where=f"mass < {limit!r}")
     run_screen(some, tmp_path / "some.parquet", HERE)
     found = pq.read_table(tmp_path / "some.parquet")
     kept = everything.filter(everything["mass"].to_numpy() < limit)
@@ -79,7 +80,7 @@ def test_rows_that_are_kept_are_those_of_a_screen_that_keeps_all(
 
 def test_the_file_says_what_it_is(tmp_path: Path) -> None:
     out = tmp_path / "s.parquet"
-    summary = run_screen(job(SPEC, condition="accepted"), out, HERE)
+    summary = run_screen(job(SPEC, where="accepted"), out, HERE)
     meta = about(out)
     assert meta["manifest"]["vary"]["thigh_length"] == "0.2:0.5"
     assert meta["manifest"]["where"] == "accepted"
@@ -94,7 +95,7 @@ def test_a_run_that_goes_on_gives_the_rows_of_one_never_stopped(
     tmp_path_factory: pytest.TempPathFactory, after: int
 ) -> None:
     folder = tmp_path_factory.mktemp("run")
-    one = job(SPEC, condition="accepted")
+    one = job(SPEC, where="accepted")
     run_screen(one, folder / "whole.parquet", HERE)
     with pytest.raises(StopError):
         run_screen(one, folder / "s.parquet", Stops(after))
@@ -129,7 +130,7 @@ def test_a_job_holds_the_files_of_its_spec(tmp_path: Path) -> None:
     text = parameters.read_text(encoding="utf-8") + "\ntrends: mine.json\n"
     parameters.write_text(text, encoding="utf-8")
     on_disk = draft.load(folder)
-    one = job(on_disk, words=["thigh_length=0.2:0.5"])
+    one = job(on_disk, vary=["thigh_length=0.2:0.5"])
     here = one.resolve(one.draw(0, 4)).mass
     heavy = on_disk.resolve().actuator_mass
     assert heavy > 1.5 * draft.load("hopper").resolve().actuator_mass
@@ -138,7 +139,7 @@ def test_a_job_holds_the_files_of_its_spec(tmp_path: Path) -> None:
     np.testing.assert_array_equal(one.resolve(one.draw(0, 4)).mass, here)
     in_memory = draft.Spec.parse(dict(one.files))
     assert in_memory.resolve().actuator_mass == heavy
-    assert job(in_memory, words=["thigh_length=0.2:0.5"]).manifest() == one.manifest()
+    assert job(in_memory, vary=["thigh_length=0.2:0.5"]).manifest() == one.manifest()
 
 
 def test_a_spec_whose_files_are_gone_makes_no_job(tmp_path: Path) -> None:
@@ -146,7 +147,7 @@ def test_a_spec_whose_files_are_gone_makes_no_job(tmp_path: Path) -> None:
     spec = draft.load(tmp_path / "mine")
     shutil.rmtree(tmp_path / "mine")
     with pytest.raises(draft.DraftError, match="cannot read"):
-        job(spec, words=["thigh_length=0.2:0.5"])
+        job(spec, vary=["thigh_length=0.2:0.5"])
 
 
 @pytest.mark.parametrize(
@@ -154,8 +155,8 @@ def test_a_spec_whose_files_are_gone_makes_no_job(tmp_path: Path) -> None:
     [
         ({"n": 2000}, r"belongs to another run: n \(1000 there, 2000 requested\) differs"),
         ({"seed": 1}, r"seed \(0 there, 1 requested\) differs"),
-        ({"condition": "accepted"}, r"where \('' there, 'accepted' requested\) differs"),
-        ({"words": VARY[:1]}, "vary differs"),
+        ({"where": "accepted"}, r"where \('' there, 'accepted' requested\) differs"),
+        ({"vary": VARY[:1]}, "vary differs"),
         ({"values": {"crouch": 0.5}}, "values differs"),
         ({"sampler": "random", "seed": 2}, r"sampler \(.*\), seed \(.*\) differ"),
         ({"spec": "cat"}, "spec differs"),
@@ -266,7 +267,7 @@ def test_a_grid_says_what_n_became(here: Path, capsys: pytest.CaptureFixture[str
     vary = ("--vary", "thigh_length=0.2:0.5", "shank_length=0.2:0.5", "--sampler", "grid")
     assert main(["screen", "robot", *vary, "--n", "1000", "--out", "s.parquet"]) == 0
     out, err = capsys.readouterr()
-    assert err == "a grid of 961 designs (asked for 1000)\n"
+    assert err == "a grid of 961 designs (asked for 1,000)\n"
     assert "961 designs, 961 kept" in out
 
 
@@ -282,17 +283,24 @@ def test_a_named_design_and_values_hold_for_all(here: Path) -> None:
     assert len(rows(Path("s.parquet"))) == 4
 
 
+@pytest.mark.parametrize("text", ["1.5", "many", "inf", "nan"])
+def test_a_number_of_designs_is_a_whole_number(
+    text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["screen", "bear", "--vary", "thigh_length=0.2:0.3", "--out", "s", "--n", text])
+    assert ended.value.code == 2
+    assert f"--n: expected a whole number, not '{text}'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--n", "0"), "--n 0 is not a number of designs"),
-        (("--n", "1.5"), "--n 1.5 is not a number of designs"),
-        (("--n", "many"), "--n many is not a number of designs"),
-        (("--n", "inf"), "--n inf is not a number of designs"),
+        (("--n", "0"), "--n 0 is not a whole number of at least 1"),
         (("--n", "1e12"), "1e+12 designs take up to "),
         (("--n", "1e12", "--where", "accepted"), "and a run has at most 1e+10"),
-        (("--seed", "-1"), "--seed -1 is not from 0 to"),
-        (("--workers", "0"), "--workers 0 is not from 1 to 1024"),
+        (("--seed", "-1"), "--seed -1 is not a whole number from 0 to 2**63 - 1"),
+        (("--workers", "0"), "--workers 0 is not a whole number from 1 to 1024"),
         (("--metrics", "masss_"), "there is no metric 'masss_'"),
         (("--out", "robot"), "--out 'robot' is a folder"),
         (("--out", "robot/tree.yaml"), "was not written by 'draft screen'; it is kept"),

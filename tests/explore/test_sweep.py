@@ -53,7 +53,7 @@ def test_metrics_of_a_batch_are_those_of_models_built_alone(tmp_path: Path) -> N
     for robot in ("quadruped", "humanoid"):
         spec = draft.load(robot)
         words = ("thigh_length=0.2:0.4", "shank_length=0.2:0.4")
-        one = job(spec, 16, "sweep", metrics=names, words=words, chunk=8)
+        one = job(spec, 16, "sweep", metrics=names, vary=words, chunk=8)
         run_sweep(one, tmp_path / robot, HERE)
         found = rows(tmp_path / robot)
         assert sum(row["accepted"] for row in found) > 8
@@ -102,7 +102,7 @@ def test_a_condition_may_read_what_only_models_have(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     metric(monkeypatch, "model_weight", "model")
-    one = job(SPEC, 60, "sweep", condition="model_weight < 300", metrics=["model_weight"])
+    one = job(SPEC, 60, "sweep", where="model_weight < 300", metrics=["model_weight"])
     summary = run_sweep(one, tmp_path / "s", HERE)
     found = rows(tmp_path / "s")
     assert 0 < len(found) == summary["rows"] < 60
@@ -113,7 +113,7 @@ def test_what_is_dropped_by_closed_form_is_not_built(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(draft.Design, "build", lambda self: pytest.fail("built"))
-    summary = run_sweep(job(SPEC, 60, "sweep", condition="leg.mass < 0"), tmp_path / "s", HERE)
+    summary = run_sweep(job(SPEC, 60, "sweep", where="leg.mass < 0"), tmp_path / "s", HERE)
     assert (summary["rows"], summary["dropped"]) == (0, 60)
 
 
@@ -182,7 +182,7 @@ def test_a_sweep_weighs_its_robots_with_their_load(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--n", "0"), "--n 0 is not a number of designs"),
+        (("--n", "0"), "--n 0 is not a whole number of at least 1"),
         (("--n", "1e12"), "1e+12 designs take up to "),
         (("--address", "a:1"), "--address is for a Ray cluster"),
         (("--out", ""), "--out names no folder"),

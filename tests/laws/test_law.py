@@ -98,6 +98,16 @@ def test_a_mean_fold_error_becomes_the_band_of_log_normal_errors(fold: float, sh
     assert law.band(share) == pytest.approx(math.exp(quantile(share) * law.sigma))
 
 
+@given(st.floats(1.01, 2), st.floats(1.01, 2), st.floats(0.0, 1.0))
+def test_a_band_between_two_known_ones_is_linear_in_the_quantile(
+    half: float, more: float, part: float
+) -> None:
+    law = _law(1.0, 1.0, fold_50=half, fold_90=half * more)
+    at = quantile(0.5) + part * (quantile(0.9) - quantile(0.5))
+    share = math.erf(at / math.sqrt(2))
+    assert law.band(share) == pytest.approx(half * more**part, rel=1e-6)
+
+
 def test_a_law_without_a_spread_says_so() -> None:
     with pytest.raises(ValueError, match="the law of x has no recorded error"):
         _law(1.0, 1.0).band()

@@ -32,7 +32,7 @@ import draft, docs.format
 from draft.cli import show
 from draft.design.bands import actuator_bands
 from draft.design.report import design_file, report
-from draft.explore.vary import parse, unit_of
+from draft.variation.axes import parse, unit_of
 from draft.explore.where import condition
 from draft.fitting.actuators.catalogue_rows import rows_of
 from draft.laws.catalogue import catalogue

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,7 @@ def study(
     designs: Sequence[str] = DESIGNS,
     seeds: Sequence[int] = (0, 1, 2),
     arms: Sequence[str] = ("nominal", "perturbed"),
-    stages: Sequence[str] = STAGES,
+    stages: Iterable[str] = STAGES,
     protocols: Sequence[str] = ("walking",),
 ) -> Path:
     """Write a study of designs trained each for itself."""

@@ -16,7 +16,7 @@ from draft.metrics import LEARNED
 from draft.metrics.capabilities import CAPABILITIES, MEASURED, Capability, Derived, of_table
 from draft.study.report.table import to_texts
 from tests.learn import synthetic
-from tests.learn.columns import stood
+from tests.learn.measuring.columns import stood
 from tests.study.report.pages import SPEED_ONLY, tables_of
 
 # Metrics of a policy that are no capabilities but properties of its measurement.

@@ -61,7 +61,9 @@ def test_learned_metrics_are_found_by_name_and_are_no_part_of_the_others() -> No
         (lambda d: metrics.of_policy(d, ["mass"]), "'mass' needs no policy"),
         (lambda d: metrics.find("learned.speed"), "did you mean 'learned.top_speed'"),
         (
-            lambda d: draft.screen(d, {"thigh_length": THIGHS}, out="x", metrics=["learned.kick"]),
+            lambda d: draft.screen(
+                d, vary={"thigh_length": THIGHS}, out="x", metrics=["learned.kick"]
+            ),
             "'learned.kick' needs a policy",
         ),
     ],
@@ -77,7 +79,7 @@ def test_a_metric_in_the_wrong_place_is_explained(
 def test_a_sweep_has_them_as_columns_and_conditions(tmp_path: Path) -> None:
     rows = draft.sweep(
         "quadruped",
-        {"thigh_length": THIGHS},
+        vary={"thigh_length": THIGHS},
         sampler="grid",
         n=4,
         metrics=["mass", "learned.top_speed"],
@@ -94,7 +96,7 @@ def test_a_sweep_has_them_as_columns_and_conditions(tmp_path: Path) -> None:
 def test_refused_designs_are_not_rolled_out(tmp_path: Path) -> None:
     rows = draft.sweep(
         "quadruped",
-        {"actuators.leg.peak_torque": [72.0, 900.0]},
+        vary={"actuators.leg.peak_torque": [72.0, 900.0]},
         sampler="grid",
         n=2,
         metrics=["learned.top_speed"],
@@ -107,7 +109,9 @@ def test_refused_designs_are_not_rolled_out(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("quick")
 def test_a_sweep_without_them_has_the_manifest_that_it_had(tmp_path: Path) -> None:
-    draft.sweep("hopper", {"thigh_length": THIGHS}, n=2, metrics=["mass"], out=tmp_path / "sweep")
+    draft.sweep(
+        "hopper", vary={"thigh_length": THIGHS}, n=2, metrics=["mass"], out=tmp_path / "sweep"
+    )
     manifest = json.loads((tmp_path / "sweep/_manifest.json").read_text(encoding="utf-8"))
     assert "policy" not in manifest
 
@@ -137,7 +141,7 @@ def test_a_search_maximises_what_the_policy_reaches(tmp_path: Path) -> None:
     pytest.importorskip("optuna")
     found = draft.optimise(
         "quadruped",
-        {"thigh_length": (0.2, 0.36)},
+        vary={"thigh_length": (0.2, 0.36)},
         maximise=["learned.top_speed"],
         minimise=["mass"],
         subject_to=["accepted", "learned.top_speed > 2.4"],
@@ -168,7 +172,7 @@ def test_a_robot_that_the_policy_cannot_drive_ends_a_sweep_before_it_begins(
 ) -> None:
     vary, out = {"thigh_length": [0.3]}, tmp_path / "sweep"
     with pytest.raises(DraftError, match=message):
-        draft.sweep(robot, vary, n=1, metrics=["learned.kick"], out=out)
+        draft.sweep(robot, vary=vary, n=1, metrics=["learned.kick"], out=out)
     assert not out.exists()
 
 

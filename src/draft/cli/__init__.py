@@ -168,7 +168,7 @@ def _call(function: Function, name: str, description: str | None, arguments: lis
     from draft.cli.values import registry
 
     _check_options(function, name, arguments)
-    RUNNING.set(function)
+    running = RUNNING.set(function)
     try:
         return tyro.cli(
             function,
@@ -180,6 +180,8 @@ def _call(function: Function, name: str, description: str | None, arguments: lis
         )
     except DraftError as error:
         raise spelt_error(error) from None
+    finally:
+        RUNNING.reset(running)
 
 
 def _check_options(function: Function, name: str, given: Sequence[str]) -> None:

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 import json as json_
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from draft.cli.interrupted import AGAIN
+from draft.cli.interrupted import AGAIN, if_interrupted
+from draft.cli.options import parse_values
+from draft.cli.settings_options import Command, with_options
 from draft.cli.spelling import spelt
 from draft.design import Design
 from draft.design.references import find_design
 from draft.errors import counted
+from draft.explore.settings import Progress, Sampled, Varied
 from draft.spec import Spec
+from draft.variation.axes import Range, ranges
 
 if TYPE_CHECKING:
-    from draft.explore.runs import Progress, Rows
+    from draft.explore.rows import Rows
 
 Vary = Annotated[
     tuple[str, ...],
@@ -29,35 +34,29 @@ Vary = Annotated[
         help_behavior_hint="(required)",
     ),
 ]
-Number = Annotated[str, tyro.conf.arg(metavar="N", help="Number of designs, such as 1e6.")]
-Where = Annotated[
-    str | None,
-    tyro.conf.arg(
-        metavar="CONDITION",
-        help='Condition on the rows to keep, such as "accepted and leg.mass < 1".',
-        help_behavior_hint="(default: all)",
-    ),
-]
-Metrics = Annotated[
-    tuple[str, ...],
-    tyro.conf.arg(
-        metavar="NAME ...",
-        help="Metrics to compute, one column each.",
-        help_behavior_hint="(default: all that apply)",
-    ),
-]
-Sampler = Annotated[
-    Literal["sobol", "grid", "random"], tyro.conf.arg(help="Method by which designs are drawn.")
-]
 Seed = Annotated[int, tyro.conf.arg(metavar="N", help="Seed of the sampler.")]
-Outside = Annotated[
-    bool,
-    tyro.conf.arg(
-        help="Measure learned metrics outside the policy's region of validity too, as of imports."
-    ),
-]
 PARTS_KEPT = f"the parts done so far are kept; {AGAIN}"
-Workers = Annotated[int, tyro.conf.arg(metavar="N", help="Number of processes.")]
+
+
+def options(kind: type[Varied]) -> Callable[[Command], Command]:
+    """Give a command an option for each setting of a run over many designs."""
+    return with_options(
+        kind,
+        without=("values", "progress"),
+        read={"vary": _ranges},
+        defaults={"vary": (), "workers": 2},
+    )
+
+
+def _ranges(words: Vary) -> Mapping[str, Range]:
+    return ranges(words)
+
+
+def given(
+    settings: Varied, values: Sequence[str], payload: float | None, progress: Progress
+) -> dict[str, Any]:
+    """Return settings as keyword arguments, with the values and the progress of a command."""
+    return dict(settings) | {"values": parse_values(values, payload), "progress": progress}
 
 
 def robot(reference: str, design: str | None) -> Spec | Design:
@@ -70,7 +69,7 @@ def robot(reference: str, design: str | None) -> Spec | Design:
     return choice.spec if choice.design is None else choice.resolve()
 
 
-def print_policy(policy: str | None) -> None:
+def print_policy(policy: str | Path | None) -> None:
     """Print the iteration of the policy of learned metrics on stderr; nothing for the shipped one.
 
     Raises:
@@ -83,7 +82,7 @@ def print_policy(policy: str | None) -> None:
 
 
 @contextmanager
-def bar(what: str, asked: str | None = None, at_once: bool = False) -> Iterator[Progress]:
+def bar(what: str, asked: int | None = None, at_once: bool = False) -> Iterator[Progress]:
     """Show a progress bar on stderr; without a terminal lines, every few seconds.
 
     Args:
@@ -106,8 +105,8 @@ def bar(what: str, asked: str | None = None, at_once: bool = False) -> Iterator[
 
         def progress(done: int, total: int) -> None:
             nonlocal started
-            if not started and asked is not None and float(asked) != total:
-                note = f"a grid of {counted(total, 'design', ',')} (asked for {asked})"
+            if not started and asked is not None and asked != total:
+                note = f"a grid of {counted(total, 'design', ',')} (asked for {asked:,})"
                 shown.console.print(note, soft_wrap=True, highlight=False)
             started = True
             shown.update(task, completed=done, total=total)
@@ -117,11 +116,35 @@ def bar(what: str, asked: str | None = None, at_once: bool = False) -> Iterator[
         yield progress
 
 
-def print_rows(rows: Rows, out: str, json: bool) -> None:
-    """Print the counts of a run, or the whole record as JSON."""
+def run_rows(
+    run: Callable[..., Rows],
+    robot: Spec | Design,
+    settings: Sampled,
+    out: str,
+    values: Sequence[str],
+    payload: float | None,
+    json: bool,
+) -> int:
+    """Run a screen or a sweep, and print its counts, or the whole record as JSON.
+
+    Args:
+        run: `draft.screen` or `draft.sweep`.
+        robot: the robot.
+        settings: settings of the run.
+        out: file or folder that it writes.
+        values: words of --set.
+        payload: mass on the trunk [kg].
+        json: whether to print JSON.
+
+    Returns:
+        The exit code.
+    """
+    asked = None if json else settings.n
+    with if_interrupted(PARTS_KEPT), bar(run.__name__, asked) as progress:
+        rows = run(robot, **given(settings, values, payload, progress))
     if json:
         print(json_.dumps(asdict(rows) | {"out": out}, indent=1))
-        return
+        return 0
     print(f"{counted(rows.designs, 'design', ',')}, {rows.rows:,} kept, {rows.dropped:,} dropped")
     refused = ", ".join(f"{kind} {count:,}" for kind, count in rows.refused_by.items())
     print(f"of those kept {rows.accepted:,} accepted" + f"; refused: {refused}" * bool(refused))
@@ -130,3 +153,4 @@ def print_rows(rows: Rows, out: str, json: bool) -> None:
         print(f"written to {out} in {rows.seconds:.1f} s ({rate:,.0f} designs/s)")
     else:
         print(f"{out} was complete already")
+    return 0

@@ -3,96 +3,33 @@
 from __future__ import annotations
 
 import json as json_
-from typing import Annotated, Literal
-
-import tyro
 
 from draft.cli import explore_options as x
 from draft.cli.interrupted import AGAIN, if_interrupted
-from draft.cli.options import (
-    DesignArgument,
-    DesignName,
-    JsonOutput,
-    LearnedPolicy,
-    Payload,
-    Values,
-    check_folder,
-    parse_values,
-)
+from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values
 from draft.errors import counted
-
-_Goals = Annotated[
-    tuple[str, ...],
-    tyro.conf.arg(
-        metavar="METRIC ...",
-        help="Metrics or expressions.",
-        help_behavior_hint="(default: none; one goal is needed)",
-    ),
-]
+from draft.explore.settings import SearchSettings
 
 
+@x.options(SearchSettings)
 def main(
     reference: DesignArgument,
     /,
-    out: Annotated[str, tyro.conf.arg(metavar="DIR", help="Folder of the study and the front.")],
-    vary: x.Vary = (),
-    minimise: _Goals = (),
-    maximise: _Goals = (),
-    subject_to: Annotated[
-        tuple[str, ...],
-        tyro.conf.arg(
-            metavar="CONDITION ...",
-            help='Conditions that designs must meet, such as accepted "leg.mass < 1".',
-            help_behavior_hint="(default: none)",
-        ),
-    ] = (),
-    trials: Annotated[
-        int, tyro.conf.arg(metavar="N", help="Designs to try, including those of earlier calls.")
-    ] = 2000,
-    sampler: Annotated[Literal["nsga2", "tpe"], tyro.conf.arg(help="Optuna's sampler.")] = "nsga2",
-    storage: Annotated[
-        str | None,
-        tyro.conf.arg(
-            metavar="URL",
-            help="Database, which several processes may share.",
-            help_behavior_hint="(default: DIR/study.db)",
-        ),
-    ] = None,
+    *,
+    settings: SearchSettings,
     design: DesignName = None,
     values: Values = (),
     payload: Payload = None,
-    policy: LearnedPolicy = None,
-    outside: x.Outside = False,
-    seed: x.Seed = 0,
-    figure: Annotated[
-        bool, tyro.conf.arg(help="Draw the front over all trials: front.png and front.pdf.")
-    ] = False,
     json: JsonOutput = False,
 ) -> int:
     """Search for designs that no other beats in every goal, and save them as named designs."""
-    check_folder(out)
-    from draft.explore.runs import optimise
+    from draft.explore.optimise import optimise
 
     robot = x.robot(reference, design)
-    x.print_policy(policy)
+    x.print_policy(settings.policy)
     with if_interrupted(f"the trials so far are kept; {AGAIN}"), x.bar("optimise") as progress:
-        front = optimise(
-            robot,
-            vary,
-            out=out,
-            minimise=minimise,
-            maximise=maximise,
-            subject_to=subject_to,
-            trials=trials,
-            values=parse_values(values, payload),
-            sampler=sampler,
-            storage=storage,
-            seed=seed,
-            policy=policy,
-            outside=outside,
-            figure=figure,
-            progress=progress,
-        )
+        front = optimise(robot, **x.given(settings, values, payload, progress))
+    out = str(settings.out)
     if json:
         record = {"out": out, "trials": front.trials, "front": front.best, "failed": front.failed}
         print(json_.dumps(record, indent=1))
@@ -109,6 +46,6 @@ def main(
         for one in front[:10]:
             words = ", ".join(f"{name} {value:.4g}" for name, value in one["goals"].items())
             print(f"  {one['design']}: {words}")
-        drawn = ", front.png, front.pdf" if figure else ""
+        drawn = ", front.png, front.pdf" if settings.figure else ""
         print(f"written to {out}: front.csv, front.json, designs/{drawn}")
     return 0

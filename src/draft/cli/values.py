@@ -6,6 +6,7 @@ tyro's own rules for optional ones accept the word None, and report every attemp
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Literal, get_args, get_origin
 
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
@@ -42,9 +43,12 @@ def _rule(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
 
 def _number(kind: type) -> Callable[[list[str]], int | float]:
     def read(words: list[str]) -> int | float:
-        try:
+        with suppress(ValueError):
             return kind(words[0])
-        except ValueError:
-            raise ValueError(f"expected {_WORDS[kind]}, not '{words[0]}'") from None
+        with suppress(ValueError):
+            number = float(words[0])
+            if number.is_integer():  # such as 1e6
+                return int(number)
+        raise ValueError(f"expected {_WORDS[kind]}, not '{words[0]}'")
 
     return read

@@ -7,17 +7,18 @@ import csv
 import io
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING, TypedDict, overload
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 
 from draft import files
-from draft.errors import DraftError
-from draft.explore.optimise import VIOLATION, Search
+from draft.errors import DraftError, counted
+from draft.explore.search import VIOLATION, Search
 from draft.values import Array
 
 if TYPE_CHECKING:
@@ -34,6 +35,41 @@ class Entry(TypedDict):
     trial: int
     values: dict[str, float]
     goals: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Front(Sequence[Entry]):
+    """The designs of a search that no other trial beats in every goal.
+
+    It is a sequence: each entry has `design` (name of its file in `out/designs`), `trial`, `values`
+    (what was varied) and `goals`, by name.
+
+    Attributes:
+        out: folder of the study and the front.
+        trials: trials of the study, those of earlier calls included.
+        best: the entries, in order of the first goal.
+        failed: number of trials that fail a condition, by condition; `a goal is undefined` counts
+            those without numbers.
+    """
+
+    out: Path
+    trials: int
+    best: tuple[Entry, ...]
+    failed: Mapping[str, int]
+
+    @overload
+    def __getitem__(self, index: int) -> Entry: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Entry, ...]: ...
+    def __getitem__(self, index: int | slice) -> Entry | tuple[Entry, ...]:
+        return self.best[index]
+
+    def __len__(self) -> int:
+        return len(self.best)
+
+    def __repr__(self) -> str:
+        best = counted(len(self), "best design")
+        return f"Front('{self.out}', {counted(self.trials, 'trial')}, {best})"
 
 
 def best(values: Array) -> NDArray[np.intp]:

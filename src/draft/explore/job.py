@@ -13,12 +13,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from draft import metrics as m
 from draft.design import Design
 from draft.design.checks import CHECKS
-from draft.errors import DraftError
-from draft.explore import sample, vary, where
-from draft.explore.vary import Axis
+from draft.design.references import find_design
+from draft.errors import DraftError, counted
+from draft.explore import where
+from draft.explore.settings import LearnedMetrics, Number, Sampled
 from draft.explore.where import Condition
 from draft.extensions import load
 from draft.extras import own_version
@@ -27,13 +30,15 @@ from draft.metrics.learned import digest
 from draft.metrics.measure import needs_more
 from draft.spec import Spec
 from draft.spec.payload import with_payload
+from draft.spec.relative import merged
 from draft.values import Array
+from draft.variation import sampling
+from draft.variation.axes import Axis, parse
 
 FORMAT = 1
 MAX_ROWS = 10**10  # of one run
-_SEED_END = 1 << 63
 
-Number = float | str | None
+Robot = Spec | Design | str | Path
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,7 @@ class Job:
     files: tuple[tuple[str, bytes], ...]
     values: tuple[tuple[str, Number], ...]
     axes: tuple[Axis, ...]
-    sampler: sample.Kind
+    sampler: sampling.Sampler
     n: int
     seed: int
     where: str
@@ -82,7 +87,7 @@ class Job:
 
     def draw(self, start: int, count: int) -> dict[str, Array]:
         """Draw the varied values of rows [start, start + count), by name, shape (count,)."""
-        return sample.draw(self.axes, self.sampler, self.n, self.seed, start, count)
+        return sampling.draw(self.axes, self.sampler, self.n, self.seed, start, count)
 
     def resolve(self, drawn: Mapping[str, Array]) -> Design:
         """Resolve the designs of drawn values in this process."""
@@ -92,15 +97,19 @@ class Job:
         """Condition on the rows to keep; None keeps all."""
         return where.condition(opened(self), self.where) if self.where else None
 
+    @property
+    def read(self) -> tuple[str, ...]:
+        """Names of the metrics to compute, and of those in the condition."""
+        condition = self.condition()
+        return tuple(dict.fromkeys((*self.metrics, *(condition.metrics if condition else ()))))
+
     def manifest(self, read: Sequence[str] = ()) -> dict[str, Any]:
         """Identity of the run as plain data: runs with equal manifests have equal rows.
 
         Args:
             read: names of metrics that are read besides those of the job.
         """
-        read = [*self.metrics, *read]
-        if self.where:
-            read += where.condition(opened(self), self.where).metrics
+        read = [*self.read, *read]
         more: dict[str, Any] = {}
         if needs_policy(read):
             first = self.resolve(self.draw(0, 1))[0]
@@ -129,85 +138,76 @@ class Job:
 
 
 def make(
-    spec: Spec,
-    kind: str,
-    varied: vary.Vary,
-    n: str | float,
-    *,
-    values: Mapping[str, Number] | None = None,
-    sampler: sample.Kind = "sobol",
-    seed: int = 0,
-    condition: str | None = None,
-    metrics: Sequence[str] | None = None,
-    chunk: int,
-    policy: str | Path | None = None,
-    outside: bool = False,
+    robot: Robot, kind: str, settings: Sampled, chunk: int, learned: LearnedMetrics | None = None
 ) -> Job:
-    """Check the arguments of a run and make its job; nothing is written.
+    """Check the settings of a run and make its job; nothing is written.
 
     Args:
-        spec: the robot.
+        robot: a spec or a design, or its reference.
         kind: name of the command.
-        varied: ranges, as `draft.explore.vary.parse` reads them.
-        n: designs to draw, such as 1e6.
-        values: values that hold for all designs.
-        sampler: sampler of the designs.
-        seed: seed of the sampler.
-        condition: condition on the rows to keep.
-        metrics: names of the metrics to compute; None for all that the command can compute.
+        settings: what is varied, and how designs are drawn and measured.
         chunk: designs per part.
-        policy: policy of learned metrics; None for the one that ships.
-        outside: whether they have values outside its region of validity too.
+        learned: settings of learned metrics; None for a run without them.
 
     Raises:
         DraftError: an argument is invalid.
     """
-    fixed = dict(values or {})
-    spec = with_payload(spec, [*fixed, *vary.names(varied)])
-    axes = vary.parse(spec, varied, fixed)
-    count = sample.rounded(axes, sampler, whole(n))
-    if not 0 <= seed < _SEED_END:
-        raise DraftError(f"`seed` {seed} is not from 0 to 2**63 - 1", "such as 0")
-    if condition:
-        where.condition(spec, condition)
-    names = _metrics(kind, metrics, axes)
+    spec, fixed = _base(robot, settings)
+    learned = learned or LearnedMetrics()
+    spec = with_payload(spec, [*fixed, *settings.vary])
+    axes = parse(spec, settings.vary, fixed)
+    count = sampling.rounded(axes, settings.sampler, settings.n)
+    if settings.where is not None:
+        where.condition(spec, settings.where)
     job = Job(
         kind,
         _files(spec),
         tuple(sorted(fixed.items())),
         axes,
-        sampler,
+        settings.sampler,
         count,
-        seed,
-        (condition or "").strip(),
-        names,
+        settings.seed,
+        (settings.where or "").strip(),
+        _metrics(kind, settings.metrics, axes),
         chunk,
-        str(Path(policy).absolute()) if policy else "",
-        outside=outside,
+        str(Path(learned.policy).absolute()) if learned.policy else "",
+        outside=learned.outside,
     )
     # Resolve one design, so that errors in the values are reported before anything is written.
     if count <= MAX_ROWS:
         design = spec.resolve(fixed, job.draw(0, 1))
-        if policy:
+        if job.policy:
             job = replace(job, digest=digest(job.policy, design[0]))
     return job
 
 
-def whole(n: str | float) -> int:
-    """Parse a number of designs, such as 1e6.
+def _base(robot: Robot, settings: Sampled) -> tuple[Spec, dict[str, Number]]:
+    """Spec of a robot, and the values that hold for all designs; those of a design are some."""
+    fixed: dict[str, Number] = {}
+    if isinstance(robot, Design):
+        spec, design = robot.spec, robot
+    else:
+        choice = find_design(robot)
+        spec, design = choice.spec, None if choice.design is None else choice.resolve()
+    if design is not None:
+        if design.count is not None:
+            remedy = "select one: design[0]"
+            raise DraftError(f"this is {counted(design.count, 'design')}", remedy)
+        for name, value in design.values.items():
+            if name not in settings.vary and not isinstance(value, np.ndarray):
+                fixed[name] = value
+    return spec, dict(merged(fixed, settings.values or {}))
+
+
+def checked_folder(out: str | Path) -> Path:
+    """Return a folder to write.
 
     Raises:
-        DraftError: it is not a whole number above zero.
+        DraftError: its name is empty, which as a path would be the current folder.
     """
-    try:
-        number = float(n)
-        count = int(number)
-    except (ValueError, OverflowError):
-        number, count = 0.5, 0
-    if count != number or count < 1:
-        remedy = "give a whole number above zero, such as 1e6"
-        raise DraftError(f"`n` {n} is not a number of designs", remedy)
-    return count
+    if not str(out).strip():
+        raise DraftError("`out` names no folder", "name one")
+    return Path(out)
 
 
 @lru_cache(maxsize=4)

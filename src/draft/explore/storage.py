@@ -1,7 +1,9 @@
 """Storage of a search: an SQLite file in its folder, or a database of Optuna by its URL.
 
 Optuna's relational storage takes some twenty statements and 20 ms for a trial. The file in the
-folder is a log of Optuna's operations instead, one row each, which takes less than 1 ms.
+folder is a log of Optuna's operations instead, one row each, which takes less than 1 ms. Optuna's
+own file of operations syncs the disk for each of them, and a kill can leave its lock, for which the
+next process waits 30 s, and half a line, with which the study cannot be continued.
 """
 
 from __future__ import annotations

@@ -303,5 +303,10 @@ def tree_file() -> type[TreeFile]:
 @lru_cache(maxsize=1)
 def _complete(links: tuple[type[LinkBase], ...]) -> None:
     """Build the models that have links, again where a script has added a primitive."""
-    for model in (*links, Trunk, TreeFile):
+    models = (*links, Trunk, TreeFile)
+    for model in models:
+        # Each would build on what another one was before.
+        if "__pydantic_core_schema__" in model.__dict__:
+            del model.__pydantic_core_schema__
+    for model in models:
         model.model_rebuild(force=True, _types_namespace={"Node": Node})

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.model import Model
-from draft.model.mjcf import COLORS
 from draft.model.shapes import shapes
 from draft.model.solids import triangles
+from draft.spec.primitives import colors
 from draft.values import Array
 
 SEGMENTS, COARSE = 24, 8
@@ -87,7 +87,7 @@ def skins(model: Model, segments: int = SEGMENTS) -> dict[Color, Skin]:
         solid = triangles(shape, model.design.trunk.loft, segments)
         vertices = solid.points @ shape.rotation.T + shape.position
         bodies = np.full(len(vertices), shape.body)
-        red, green, blue = (round(255 * x) for x in COLORS[shape.kind][:3])
+        red, green, blue = (round(255 * x) for x in colors()[shape.kind][:3])
         skin = Skin(vertices, bodies, solid.faces.astype(np.uint32))
         parts.setdefault((red, green, blue), []).append(skin)
     return {color: _joined(of) for color, of in parts.items()}

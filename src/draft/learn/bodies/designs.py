@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from draft.design import Design
-    from draft.explore.vary import Axis, Vary
     from draft.spec import Spec
+    from draft.variation.axes import Axis, Vary
 
 _BLOCK = 1024  # Designs resolved at once.
 _DRAWS_PER_BODY = 50  # Draws before giving up; at least one block.
@@ -63,8 +63,8 @@ def open_bodies(
     Args:
         references: designs as `draft.design.references.open_designs` takes them; exactly one if
             `vary` is given.
-        vary: ranges, see `draft.explore.vary.parse`; designs are drawn from them until `count` pass
-            the filter and can be trained.
+        vary: ranges, see `draft.variation.axes.parse`; designs are drawn from them until `count`
+            pass the filter and can be trained.
         count: number of designs to draw; only with `vary`.
         values: parameter values that override those of the designs.
         seed: seed of the draws.
@@ -95,7 +95,7 @@ def _drawn(
     seed: int,
 ) -> Bodies:
     """Draw a family around one design."""
-    from draft.explore import vary as axes
+    from draft.variation import axes
 
     if len(designs) != 1:
         cause = f"`vary` varies one design, but {len(designs)} are named"
@@ -189,12 +189,12 @@ class _Draws:
         Raises:
             DraftError: too few pass.
         """
-        from draft.explore import sample
+        from draft.variation import sampling
 
         fixed = dict(self.base.values)
         most = max(_DRAWS_PER_BODY * count, _BLOCK)
         for start in range(0, most, _BLOCK):
-            drawn = sample.draw(self.axes, "sobol", most, self.seed, start, _BLOCK)
+            drawn = sampling.draw(self.axes, "sobol", most, self.seed, start, _BLOCK)
             self._accept(self.base.spec.resolve(fixed, drawn), count)
             if len(self.members) == count:
                 return

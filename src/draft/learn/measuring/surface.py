@@ -24,7 +24,7 @@ from draft.metrics.learned import REPLICAS, SECONDS
 from draft.values import Array
 
 if TYPE_CHECKING:
-    from draft.explore.vary import Axis, Vary
+    from draft.variation.axes import Axis, Vary
 
 MOST_POINTS = 100  # Points along one axis.
 TABLE, PAGE, RECORD = "surface.csv", "surface.html", "surface.json"
@@ -106,8 +106,8 @@ def surface(
         DraftError: the ranges are not two or invalid, no design can be measured, or the policy does
             not fit.
     """
-    from draft.explore import sample
-    from draft.explore import vary as axes_of
+    from draft.variation import axes as axes_of
+    from draft.variation import sampling
 
     if isinstance(design, str):
         design = find_design(design).resolve()
@@ -116,7 +116,7 @@ def surface(
     axes = [_rising(axis) for axis in axes_of.parse(design.spec, vary)]
     first, second = axes
     count = (len(first.values) or points) * (len(second.values) or points)
-    drawn = sample.draw(axes, "grid", count, 0, 0, count)
+    drawn = sampling.draw(axes, "grid", count, 0, 0, count)
     many = design.spec.resolve(dict(design.values), drawn)
     found, reasons = learned.of_designs(
         source,

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field
 from pydantic_core import CoreSchema, core_schema
 
-from draft.explore.vary import Vary
 from draft.learn.engine.machine import EngineName
 from draft.learn.task.recipes import RecipeName
 from draft.learn.task.stages import StageName
 from draft.settings import Settings, Shown
+from draft.variation.axes import Vary
 
 if TYPE_CHECKING:
     from draft.learn.training.run import Plan

@@ -1,0 +1,1 @@
+"""Variation of numbers of a design: ranges, and samples drawn from them."""

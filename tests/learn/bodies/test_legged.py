@@ -1,0 +1,329 @@
+"""What learning reads off a design, what it refuses, and real quadrupeds."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import draft
+from draft.design.references import open_designs
+from draft.errors import DraftError, RefusedError
+from draft.learn.bodies.legged import CLASSES, LeggedRobot, check_family, legged_robot
+
+SHIPPED = Path(draft.__file__).parent / "robots" / "quadruped"
+SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[3].parent / "shared"))
+ROBOTS = SHARED / "robots"
+REAL = {
+    "go2": "twins/go2/go2_description.urdf",
+    "b2": "twins/b2/b2_description.urdf",
+    "anymal_c": "survey/anymal_c.urdf",
+    "lite3": "survey/deeprobotics_lite3.urdf",
+    "a2": "survey/unitree_a2.urdf",
+    "zsl1": "survey/zsibot_zsl1.urdf",
+}
+# Leg [m], scale, torque [N m], speed [rad/s], estimated top speed [m/s]: study, sections 2 and 7.
+NUMBERS = {
+    "cheetah": (0.48, 1.000, 72, 40, 2.452),
+    "bear": (0.74, 1.542, 450, 11.31, 3.013),
+    "giraffe": (1.30, 2.708, 332, 3.93, 1.774),
+}
+
+
+def shipped(name: str) -> LeggedRobot:
+    (design,) = open_designs([name])
+    return legged_robot(design)
+
+
+def changed(folder: Path, *edits: tuple[str, str]) -> draft.Design:
+    """The shipped quadruped with its tree changed."""
+    shutil.copytree(SHIPPED, folder)
+    tree = folder / "tree.yaml"
+    text = tree.read_text(encoding="utf-8")
+    for old, new in edits:
+        assert old in text
+        text = text.replace(old, new)
+    tree.write_text(text, encoding="utf-8")
+    return draft.load(folder).resolve()
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_numbers_of_the_shipped_designs(name: str) -> None:
+    found = shipped(name)
+    leg, scale, torque, speed, top = NUMBERS[name]
+    assert found.name == f"quadruped:{name}"
+    assert found.leg_length == pytest.approx(leg)
+    assert found.scale == pytest.approx(scale, abs=5e-4)
+    assert found.peak_torque == pytest.approx((torque,) * 12)
+    assert found.no_load_speed == pytest.approx((speed,) * 12)
+    assert found.top_speed == pytest.approx(top, abs=5e-4)
+    assert found.home == (0.0, 0.5, -1.0) * 4
+    assert found.ranges == ((-0.8, 0.8), (-2.5, 2.5), (-2.8, 0.0)) * 4
+    assert found.feet == ("FL_foot", "FR_foot", "RL_foot", "RR_foot")
+    assert found.leg_joints == ((0, 1, 2), (3, 4, 5), (6, 7, 8), (9, 10, 11))
+    assert [found.joints[i] for i in found.leg_joints[1]] == [
+        "FR_hip_roll",
+        "FR_hip_pitch",
+        "FR_knee",
+    ]
+    assert found.leg_mirror == (1, 0, 3, 2)
+    assert found.mirror == (3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8)
+    # Near the crouch's 0.878 L and the foot's radius (study, section 5).
+    assert found.height == pytest.approx(0.878 * leg + found.foot_radius, abs=1e-3 * leg)
+
+
+def test_it_goes_through_json() -> None:
+    found = shipped("bear")
+    assert LeggedRobot.from_dict(json.loads(json.dumps(found.as_dict()))) == found
+    with pytest.raises(KeyError):
+        LeggedRobot.from_dict({"name": "bear"})
+
+
+def mirrored_feet(found: LeggedRobot, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Feet of a random pose mirrored in y, and feet of the mirrored pose, leg for leg."""
+    model = mujoco.MjModel.from_xml_string(found.xml)
+    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+    low, high = np.array(found.ranges).T
+    pose = rng.uniform(low, high)
+    other = np.empty(len(pose))
+    for i, j in enumerate(found.mirror):
+        other[j] = found.mirror_sign[i] * pose[i]
+    feet = []
+    for angles in (pose, other):
+        data.qpos[:7], data.qpos[7:] = (0, 0, 0, 1, 0, 0, 0), angles
+        mujoco.mj_kinematics(model, data)
+        feet.append(np.array([data.site(name).xpos for name in found.feet]))
+    return feet[0] * (1, -1, 1), feet[1][list(found.leg_mirror)]
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("seed", range(5))
+def test_a_mirrored_pose_has_mirrored_feet(name: str, seed: int) -> None:
+    expected, found = mirrored_feet(shipped(name), seed)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+def test_mirroring_twice_gives_the_same_pose() -> None:
+    found = shipped("cheetah")
+    for i, j in enumerate(found.mirror):
+        assert found.mirror[j] == i
+        assert found.mirror_sign[j] == found.mirror_sign[i]
+        assert i != j
+    assert found.mirror_sign == (-1.0, 1.0, 1.0) * 4
+
+
+@pytest.mark.skipif(not ROBOTS.is_dir(), reason="the robots are not beside this folder")
+@pytest.mark.parametrize("name", REAL)
+@pytest.mark.filterwarnings("ignore")
+def test_real_quadrupeds_come_through_the_import(name: str, tmp_path: Path) -> None:
+    from draft.imports.importer import import_robot
+
+    found = legged_robot(import_robot(ROBOTS / REAL[name], tmp_path / name).spec.resolve())
+    expected, feet = mirrored_feet(found, 0)
+    # Makers round their descriptions of the two sides.
+    np.testing.assert_allclose(feet, expected, atol=2e-3)
+    assert sorted(i for leg in found.leg_joints for i in leg) == list(range(12))
+    assert all(len(leg) > 0 for leg in found.upper_legs)
+    assert 0.4 * found.leg_length < found.height < found.leg_length + 2 * found.foot_radius
+    if name == "go2":
+        assert found.leg_length == pytest.approx(0.213 * 2, abs=1e-3)
+        assert found.peak_torque == pytest.approx((23.7, 23.7, 45.43) * 4)
+        assert found.no_load_speed == pytest.approx((30.1, 30.1, 15.7) * 4)
+
+
+ROLL = "name: hip_roll, axis: x"
+SPHERE = """      type: sphere
+      joint: {name: knee, axis: y, range: [-2.8, 0], actuator: leg, home: -crouch}
+      link: {axis: -z, length: shank_length, segment: shank, radius: shank_radius}
+      sphere: {radius: foot_radius, site: foot}"""
+PLATE = """      type: foot
+      joint: {name: knee, axis: y, range: [-2.8, 0], actuator: leg, home: -crouch}
+      link: {axis: -z, length: shank_length, segment: shank, radius: shank_radius}
+      plate: {length: 0.1, width: 0.05, thickness: 0.01, offset: 0, site: foot}"""
+RIGHT_REAR = (
+    "    - {chain: leg, prefix: RR_, at: [trunk_length / 2, hip_spacing / 2, 0], mirror: xy}\n"
+)
+ONLY = (
+    "use a robot with left and right legs, each with a knee (a driven hinge of a link of "
+    "`segment: shank`) and a foot with a site, whose joints are all driven"
+)
+LEG = "    - {chain: leg, prefix: FL_,"
+MIDDLE = "".join(
+    f"    - {{chain: leg, prefix: {side}, at: [0, hip_spacing / 2, 0]{mirror}}}\n"
+    for side, mirror in (("ML_", ""), ("MR_", ", mirror: y"))
+)
+ARM = """  arm:
+    - name: shoulder_motor
+      motor: {actuator: leg, axis: y}
+    - name: upper_arm
+      joint: {name: shoulder, axis: AXIS, range: [-1, 1], actuator: leg}
+      link: {axis: z, length: 0.2, segment: thigh}
+
+tree:"""
+
+
+FREE = (
+    ARM.replace("    - name: shoulder_motor\n      motor: {actuator: leg, axis: y}\n", "")
+    .replace("AXIS", "y")
+    .replace(", actuator: leg}", "}")
+)
+
+
+def walker(name: str, folder: Path) -> LeggedRobot:
+    """A robot that is no quadruped with three joints on every leg, or is one with other axes."""
+    edits = {
+        "hexapod": ((LEG, MIDDLE + LEG),),
+        "yaw": ((ROLL, "name: hip_roll, axis: z"),),
+        "plates": ((SPHERE, PLATE),),
+        "arm": (
+            ("\ntree:", "\n" + ARM.replace("AXIS", "y")),
+            (LEG, f"    - {{chain: arm}}\n{LEG}"),
+        ),
+    }
+    return shipped(name) if name not in edits else legged_robot(changed(folder, *edits[name]))
+
+
+@pytest.mark.parametrize(
+    ("name", "legs", "classes"),
+    [
+        ("hexapod", 6, ("hip roll", "hip pitch", "knee")),
+        ("arm", 4, ("shoulder", "hip roll", "hip pitch", "knee")),
+        ("plates", 4, CLASSES),
+        ("yaw", 4, CLASSES),
+        (
+            "humanoid",
+            2,
+            (
+                *("shoulder pitch", "shoulder roll", "shoulder yaw", "elbow"),
+                *("wrist yaw", "wrist pitch", "wrist roll"),
+                *("waist roll", "waist pitch", "waist yaw"),
+                *("hip pitch", "hip roll", "hip yaw", "knee", "ankle pitch", "ankle roll"),
+            ),
+        ),
+    ],
+)
+def test_other_legged_robots_are_found_by_their_structure(
+    name: str, legs: int, classes: tuple[str, ...], tmp_path: Path
+) -> None:
+    found = walker(name, tmp_path / "robot")
+    assert len(found.feet) == len(found.leg_joints) == len(found.upper_legs) == legs
+    assert all(found.upper_legs)
+    assert found.classes == classes
+    names = [joint.replace("_", " ") for joint in found.joints]
+    assert all(n.endswith(classes[k]) for n, k in zip(names, found.joint_classes, strict=True))
+    expected, feet = mirrored_feet(found, 3)
+    np.testing.assert_allclose(feet, expected, atol=1e-9)
+    expected, anchors = mirrored_anchors(found, 4)
+    np.testing.assert_allclose(anchors, expected, atol=1e-9)
+
+
+def mirrored_anchors(found: LeggedRobot, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Anchors of all joints in a random pose mirrored in y, and those of the mirrored pose."""
+    model = mujoco.MjModel.from_xml_string(found.xml)
+    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+    low, high = np.array(found.ranges).T
+    pose = rng.uniform(low, high)
+    anchors = []
+    for angles in (pose, np.array(found.mirror_sign) * pose[list(found.mirror)]):
+        data.qpos[:7], data.qpos[7:] = (0, 0, 0, 1, 0, 0, 0), angles
+        mujoco.mj_kinematics(model, data)
+        anchors.append(data.xanchor[[model.joint(name).id for name in found.joints]].copy())
+    return anchors[0] * (1, -1, 1), anchors[1][list(found.mirror)]
+
+
+def test_feet_touch_the_ground_in_the_home_pose(tmp_path: Path) -> None:
+    for name in ("cheetah", "hexapod", "plates", "humanoid"):
+        found = walker(name, tmp_path / name)
+        spec = mujoco.MjSpec.from_string(found.xml)
+        floor = mujoco.mjtGeom.mjGEOM_PLANE
+        spec.worldbody.add_geom(name="floor", type=floor, size=[5, 5, 1])
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        data.qpos[:7] = (0, 0, found.height + 1e-4, 1, 0, 0, 0)
+        data.qpos[7:] = found.home
+        mujoco.mj_forward(model, data)
+        gaps = [
+            mujoco.mj_geomDistance(
+                model, data, model.geom(geom).id, model.geom("floor").id, 1, None
+            )
+            for geom in found.foot_geoms
+        ]
+        assert min(gaps) == pytest.approx(1e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("edits", "cause"),
+    [
+        (((RIGHT_REAR, ""),), "its legs are not pairs of a left and a right one"),
+        (
+            (
+                ("\ntree:", "\n" + ARM.replace("AXIS", "y")),
+                (LEG, f"    - {{chain: arm, at: [0, 0.1, 0]}}\n{LEG}"),
+            ),
+            "its joint shoulder has no counterpart on the other side",
+        ),
+        (
+            (
+                ("\ntree:", "\n" + FREE),
+                (LEG, f"    - {{chain: arm}}\n{LEG}"),
+            ),
+            "its joint shoulder has no actuator",
+        ),
+    ],
+    ids=["three_legs", "arm_on_one_side", "passive_joint"],
+)
+def test_robots_that_cannot_be_trained_are_refused_with_the_cause(
+    tmp_path: Path, edits: tuple[tuple[str, str], ...], cause: str
+) -> None:
+    with pytest.raises(DraftError) as caught:
+        legged_robot(changed(tmp_path / "robot", *edits))
+    assert f"cannot be trained: {cause}" in str(caught.value)
+    assert str(caught.value).endswith(ONLY)
+
+
+def test_without_a_home_pose_legs_crouch_and_other_joints_stay_at_zero(tmp_path: Path) -> None:
+    arm = ("\ntree:", "\n" + ARM.replace("AXIS", "y"))
+    bare = ((", home: crouch / 2", ""), (", home: -crouch", ""))
+    with_arm = (arm, (LEG, f"    - {{chain: arm}}\n{LEG}"))
+    found = legged_robot(changed(tmp_path / "robot", *bare, *with_arm))
+    home = dict(zip(found.joints, found.home, strict=True))
+    assert home["shoulder"] == 0.0
+    assert home["FL_knee"] < -0.5
+
+
+@pytest.mark.parametrize(("axis", "sign"), [("x", -1.0), ("y", 1.0), ("z", -1.0)])
+def test_a_joint_in_the_middle_mirrors_to_itself(axis: str, sign: float, tmp_path: Path) -> None:
+    arm = ("\ntree:", "\n" + ARM.replace("AXIS", axis))
+    found = legged_robot(changed(tmp_path / "robot", arm, (LEG, f"    - {{chain: arm}}\n{LEG}")))
+    shoulder = found.joints.index("shoulder")
+    assert (found.mirror[shoulder], found.mirror_sign[shoulder]) == (shoulder, sign)
+
+
+def test_a_robot_on_one_leg_is_refused() -> None:
+    with pytest.raises(DraftError, match="hopper cannot be trained: it has one leg"):
+        shipped("hopper")
+
+
+def test_a_design_that_the_filter_refuses_is_refused() -> None:
+    design = draft.load("quadruped").resolve({"actuators.leg.peak_torque": 600})
+    assert not design.accepted
+    with pytest.raises(RefusedError):
+        legged_robot(design)
+
+
+def test_designs_of_another_topology_are_no_family() -> None:
+    first = shipped("cheetah")
+    check_family([first, shipped("bear"), shipped("giraffe")])
+    other = replace(first, name="other", feet=("a", "b", "c", "d"))
+    with pytest.raises(
+        DraftError, match="other has another topology than quadruped:cheetah: its feet"
+    ):
+        check_family([first, other])
