@@ -59,7 +59,7 @@ def _done(run: Path) -> bool:
     if not is_run(run):
         return False
     found = open_run(run)
-    return found.done() >= found.plan.config.learning.iterations(found.plan.stage)
+    return found.done() >= found.plan.config.iterations(found.plan.stage)
 
 
 def halved(model: onnx.ModelProto) -> onnx.ModelProto:
