@@ -164,7 +164,12 @@ def check_arguments(words: Sequence[str]) -> None:
     error = io.StringIO()
     with contextlib.redirect_stderr(error):
         try:
-            tyro.cli(stand_in, args=list(arguments), config=(tyro.conf.FlagCreatePairsOff,))
+            tyro.cli(
+                stand_in,
+                args=list(arguments),
+                config=(tyro.conf.FlagCreatePairsOff,),
+                registry=registry,
+            )
         except SystemExit as ended:
             raise BlockError(f"'draft {shlex.join(words)}':\n{error.getvalue()}") from ended
 
