@@ -148,6 +148,7 @@ def check_arguments(words: Sequence[str]) -> None:
     import tyro
 
     from draft.cli import functions
+    from draft.cli.values import registry
 
     own, subcommands = functions(words[0])
     name, arguments = (
