@@ -144,6 +144,8 @@ def api() -> str:
         if isinstance(value, types.ModuleType):
             # Aliases of types and the registry have no docstrings of their own.
             members = [one for one in value.__all__ if _is_ours(getattr(value, one))]
+            # Names of `draft` have an entry of their own.
+            members = [one for one in members if one not in dir(draft)]
             body = f".. automodule:: draft.{name}\n"
             for one in members:
                 kind = "class" if inspect.isclass(getattr(value, one)) else "function"

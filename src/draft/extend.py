@@ -2,7 +2,7 @@
 
 An extension is a module that uses these decorators. A script that does so has what it adds at once;
 an installed package names its module in the entry-point group `draft.extensions`, so that every
-command has it. docs/howto/extend.md is an introduction, `examples/extension` a whole package.
+command has it. docs/howto/extend.md is an introduction, `examples/extension` a whole package::
 
     from draft.extend import Design, Value, metric
 

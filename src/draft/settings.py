@@ -194,6 +194,7 @@ def by_keyword(record: Callable[..., Any]) -> Callable[[Callable[..., Any]], Cal
             settings = kind.of({one: given.pop(one) for one in fields.keys() & given.keys()})
             return function(**given, **{name: settings})
 
+        del call.__dict__["__wrapped__"]  # Sphinx would look there for defaults of the fields.
         call.__dict__["__signature__"] = signature
         call.__annotations__ = {one.name: one.annotation for one in parameters} | {
             field: kind.model_fields[field].annotation for field in fields
