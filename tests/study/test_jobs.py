@@ -58,7 +58,7 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
     assert evaluate == EvaluateRequest(
         run=run,
         checkpoint=2,
-        battery=("push",),
+        test=("push",),
         levels=2,
         replicas=2,
         errors="twins",

@@ -104,8 +104,8 @@ def test_samples_are_small_even_if_all_that_torque_and_speed_can_be_is_met(tmp_p
         {joint: cells + 10_000 for joint, cells in samples.plane.items()},
     )
     told = files.SamplesFile.of(full).model_dump()
-    batteries = 3 * 3 * 5  # designs, seeds, batteries
-    assert 1e6 < batteries * len(files.dumps(told)) < 2.6e6
+    records = 3 * 3 * 5  # designs, seeds, tests
+    assert 1e6 < records * len(files.dumps(told)) < 2.6e6
 
 
 def test_what_comes_in_later_is_added(source: Path, tmp_path: Path) -> None:
