@@ -148,6 +148,7 @@ def check_arguments(words: Sequence[str]) -> None:
     import tyro
 
     from draft.cli import functions
+    from draft.cli.values import registry
 
     own, subcommands = functions(words[0])
     name, arguments = (
@@ -164,7 +165,12 @@ def check_arguments(words: Sequence[str]) -> None:
     error = io.StringIO()
     with contextlib.redirect_stderr(error):
         try:
-            tyro.cli(stand_in, args=list(arguments), config=(tyro.conf.FlagCreatePairsOff,))
+            tyro.cli(
+                stand_in,
+                args=list(arguments),
+                config=(tyro.conf.FlagCreatePairsOff,),
+                registry=registry,
+            )
         except SystemExit as ended:
             raise BlockError(f"'draft {shlex.join(words)}':\n{error.getvalue()}") from ended
 

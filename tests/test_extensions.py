@@ -19,6 +19,7 @@ import draft
 from draft import doctor, extensions
 from draft.design.checks import CHECKS, kinds
 from draft.extensions import ExtensionWarning, Registry, load
+from draft.extras import DISTRIBUTION
 from draft.laws.actuators import ACTUATOR_LAWS
 from draft.metrics import METRICS, of_design, of_model
 from draft.model.exporters import EXPORTERS
@@ -473,6 +474,7 @@ def test_worker_processes_have_the_extension(tmp_path: Path) -> None:
 def test_the_example_passes_its_own_tests(tmp_path: Path) -> None:
     project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]
     (entry,) = project["entry-points"]["draft.extensions"].values()
+    assert project["dependencies"] == [DISTRIBUTION]
     shutil.copytree(EXAMPLE / entry, tmp_path / entry)
     write(tmp_path, "installed", "", entry)
     tests = str(EXAMPLE / "tests")

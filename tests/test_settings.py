@@ -72,7 +72,7 @@ def test_a_function_takes_the_fields_by_keyword_and_documents_them() -> None:
             "`minutes` nan is not a number above 0\n  omit it for no limit",
         ),
         ({"errors": "papr"}, "`errors` 'papr' is not known\n  did you mean 'paper'? choose from"),
-        ({"levels": "x"}, "`levels` x is not a number, or levels\n  omit it for all"),
+        ({"levels": "x"}, "`levels` 'x' is not a number, or levels\n  omit it for all"),
         ({"quiet": 1}, "`quiet` 1 is not true or false"),
         ({"replica": 3}, "there is no setting 'replica'\n  did you mean 'replicas'?"),
         ({"replicas": 0, "minutes": 0}, "`minutes` 0 is not a number above 0"),

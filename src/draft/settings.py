@@ -118,7 +118,8 @@ class Settings(BaseModel):
             return Problem(f"`{name}` '{given}' is not known", None, remedy)
         otherwise = shown(field).default or _text(field.get_default())
         remedy = "" if field.is_required() else f"omit it for {otherwise}"
-        return Problem(f"`{name}` {_text(given)} is not {expected(field)}", None, remedy)
+        words = repr(given) if isinstance(given, str) else _text(given)
+        return Problem(f"`{name}` {words} is not {expected(field)}", None, remedy)
 
 
 def shown(field: FieldInfo) -> Shown:
@@ -186,7 +187,10 @@ def by_keyword(record: Callable[..., Any]) -> Callable[[Callable[..., Any]], Cal
 
         @functools.wraps(function)
         def call(*args: Any, **values: Any) -> Any:
-            given = signature.bind(*args, **values).arguments
+            try:
+                given = signature.bind(*args, **values).arguments
+            except TypeError as error:
+                raise TypeError(f"{function.__name__}() {error}") from None
             settings = kind.of({one: given.pop(one) for one in fields.keys() & given.keys()})
             return function(**given, **{name: settings})
 

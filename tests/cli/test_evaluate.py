@@ -114,7 +114,7 @@ def test_a_design_is_evaluated_with_a_policy(capsys: pytest.CaptureFixture[str])
         (["run", "--test", "swim"], "--test 'swim' is not known\n  choose from: push, speed"),
         (["run", "--test", " , "], "--test [] is not names among walk"),
         (["run", "--test", "speed"], "is for policies of stage velocity, and run is of stage"),
-        (["run", "--levels", "x"], "--levels x is not a number of levels, or levels above 0"),
+        (["run", "--levels", "x"], "--levels 'x' is not a number of levels, or levels above 0"),
         (["run", "--replicas", "0"], "--replicas 0 is not a whole number from 1"),
         (["run", "--seconds", "0.1"], "--seconds 0.1 is not"),
         (["run", "--seed", "-1"], "--seed -1 is not"),

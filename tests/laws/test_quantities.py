@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,9 +9,10 @@ import pytest
 import draft
 from draft.laws.quantities import QUANTITIES, Identity
 from draft.spec.schema import STATED
+from tests.changed_package import ChangedPackage
 
 # Line of the table after which a copy of the package gains another one.
-LINE = '    mass: Value = _line("kg", "mass", "Mass of the whole module [kg].", law=TREND)\n'
+AFTER = "    volume: Value = _line("  # What follows the mass.
 NEW = """    torque_density: Value = _line(
         "kN m/kg", "torque per mass", "Peak torque over mass [kN m/kg].",
         law=Identity("tau / m", ("peak_torque", "mass"), lambda torque, mass: torque / mass),
@@ -76,24 +71,8 @@ print(json.dumps({
 @pytest.fixture(scope="module")
 def added(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What a copy of the package says whose table of quantities gains one entry."""
-    home, folder = Path(draft.__file__).parent, tmp_path_factory.mktemp("copy")
-    shutil.copytree(home, folder / "draft", ignore=shutil.ignore_patterns("__pycache__"))
-    table = folder / "draft" / "laws" / "quantities.py"
-    text = table.read_text(encoding="utf-8")
-    assert text.count(LINE) == 1
-    table.write_text(text.replace(LINE, LINE + NEW), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-c", READ],
-        env={
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join((str(folder), str(Path(__file__).parents[2]))),
-        },
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    inserted = {"laws/quantities.py": {AFTER: NEW}}
+    return ChangedPackage(tmp_path_factory.mktemp("copy"), inserted).run("-c", READ)
 
 
 @pytest.mark.slow

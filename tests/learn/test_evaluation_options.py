@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
-import draft
+from tests.changed_package import ChangedPackage
 
 OPTION = '''
     slope: Annotated[float, Field(ge=0, le=30), Shown("ANGLE", "flat", unit="deg")] = 0.0
@@ -59,22 +54,9 @@ print(json.dumps(told))
 def test_an_option_is_added_by_its_field(tmp_path: Path) -> None:
     from tests.study.small import jobs
 
-    copy, root = tmp_path / "draft", Path(__file__).parents[2]
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(Path(draft.__file__).parent, copy, ignore=ignored, copy_function=os.symlink)
-    file = copy / "learn/measuring/evaluation_options.py"
-    text, end = file.read_text(), "\n\nclass RollOuts("  # What follows `Extras`.
-    file.unlink()
-    file.write_text(text.replace(end, OPTION + end))
-    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"}
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(tmp_path)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    told = json.loads(done.stdout.splitlines()[-1])
+    # What follows `Extras`.
+    inserted = {"learn/measuring/evaluation_options.py": {"\n\nclass RollOuts(": OPTION}}
+    told = ChangedPackage(tmp_path, inserted).run("-c", PROGRAM, str(tmp_path))
     # The command, its completion, and Python.
     assert "--slope ANGLE Slope of the ground [deg]. (default: flat)" in told["help"]
     assert told["completed"]

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,6 +10,7 @@ import draft
 from draft.cli import main
 from draft.errors import DraftError
 from draft.study.requests import TrainRequest, from_dict, to_dict
+from tests.changed_package import ChangedPackage
 from tests.study.small import TEXT, study
 
 # Of the task, which all trainings of a study share, and of a call.
@@ -59,24 +55,9 @@ print(json.dumps(told))
 
 
 def test_an_option_of_a_training_is_added_by_its_field(tmp_path: Path) -> None:
-    copy, root = tmp_path / "draft", Path(__file__).parents[2]
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(Path(draft.__file__).parent, copy, ignore=ignored, copy_function=os.symlink)
-    file = copy / "learn/training/options.py"
-    text = file.read_text()
-    for more, end in ((SHARED, "\n\nclass SliceOptions("), (OF_A_CALL, "\n    def total(")):
-        assert text.count(end) == 1
-        text = text.replace(end, more + end)
-    file.unlink()
-    file.write_text(text)
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(tmp_path)],
-        env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{root}"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    told = json.loads(done.stdout.splitlines()[-1])
+    inserted = {"\n\nclass SliceOptions(": SHARED, "\n    def total(": OF_A_CALL}
+    changed = ChangedPackage(tmp_path, {"learn/training/options.py": inserted})
+    told = changed.run("-c", PROGRAM, str(tmp_path))
     # The command, its completion, and Python.
     assert "--rocks N Number of rocks on the ground. (default: none)" in told["help"]
     assert "--echo S Time between two lines of progress [s]. (default: none)" in told["help"]

@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import json
-import os
-import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from itertools import groupby
 from pathlib import Path
@@ -23,6 +18,7 @@ import draft
 from draft.metrics import LEARNED, METRICS, find, metric, of_design, of_model
 from draft.metrics.speed import top_speed
 from draft.metrics.statics import joint_margins
+from tests.changed_package import ChangedPackage
 from tests.helpers import leg, parameter, robot
 
 SHIPPED = (
@@ -84,22 +80,9 @@ def ballast(design):
 @pytest.fixture(scope="module")
 def with_ballast(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
     """The recipe of CONTRIBUTING: a copy of the package gains one file, and nothing else."""
-    tmp_path = tmp_path_factory.mktemp("copy")
-    copy = tmp_path / "draft"
-    shutil.copytree(Path(draft.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    (copy / "metrics" / "ballast.py").write_text(NEW, encoding="utf-8")
-
-    def said(*words: str) -> Any:
-        done = subprocess.run(
-            [sys.executable, "-m", "draft", *words, "--json"],
-            env={**os.environ, "PYTHONPATH": str(tmp_path)},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return json.loads(done.stdout)
-
-    return said
+    added = {"metrics/ballast.py": {"": NEW}}
+    changed = ChangedPackage(tmp_path_factory.mktemp("copy"), added)
+    return lambda *words: changed.run("-m", "draft", *words, "--json")
 
 
 @pytest.mark.slow

@@ -75,7 +75,7 @@ def ranges(vary: Vary) -> Mapping[str, Range]:
         return vary
     given = [vary] if isinstance(vary, str) else vary
     if not (isinstance(given, Sequence) and all(isinstance(word, str) for word in given)):
-        cause = f"vary is {vary!r}, neither ranges by name nor words"
+        cause = f"`vary` is {vary!r}, neither ranges by name nor words"
         raise DraftError(cause, 'give ranges such as {"thigh_length": (0.2, 0.4)}')
     return words.ranges(given)
 

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,10 +10,10 @@ import pytest
 pytest.importorskip("mjlab")
 import torch
 
-import draft
 from draft.learn.task.constants import Scaled
 from draft.learn.task.groups import Rewards
 from draft.learn.task.mdp import rewards
+from tests.changed_package import ChangedPackage
 from tests.learn.task.states import ask, each, first, place, roots, stand, turn
 
 TILT = 0.3
@@ -305,18 +299,12 @@ print(json.dumps({"loaded": loaded, "stages": stages, "values": values}))
 @pytest.fixture(scope="module")
 def added(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What a process finds whose Draft has one more reward."""
-    folder = tmp_path_factory.mktemp("added")
-    copy = folder / "draft"
-    shutil.copytree(Path(draft.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    functions, config = copy / "learn/task/mdp/rewards.py", copy / "learn/task/groups.py"
-    functions.write_text(functions.read_text() + FUNCTION)
-    end = "\n\n@dataclass(frozen=True)\nclass Episodes"  # What follows `Rewards`.
-    config.write_text(config.read_text().replace(end, NUMBERS + end))
-    environment = {**os.environ, "PYTHONPATH": str(folder)}
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=True
-    )
-    return json.loads(done.stdout.splitlines()[-1])
+    inserted = {
+        "learn/task/mdp/rewards.py": {"\n\ndef reward_cfgs(": FUNCTION},
+        # What follows `Rewards`.
+        "learn/task/groups.py": {"\n\n@dataclass(frozen=True)\nclass Episodes": NUMBERS},
+    }
+    return ChangedPackage(tmp_path_factory.mktemp("added"), inserted).run("-c", PROGRAM)
 
 
 def test_a_reward_is_added_by_a_function_and_its_numbers(added: dict[str, Any]) -> None:
