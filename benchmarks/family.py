@@ -39,7 +39,7 @@ import draft
 from draft.learn.bodies.designs import open_bodies
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.engine.machine import NATIVE, cores
-from draft.learn.measuring.levels import BATTERIES, PUSH, SPEED, settle
+from draft.learn.measuring.levels import PUSH, SKILL_TESTS, SPEED, settle
 from draft.learn.measuring.policies import open_source
 from draft.learn.measuring.rollout.evaluate import evaluate, trained
 from draft.learn.measuring.rollout.trial import Trial
@@ -226,8 +226,8 @@ def _measured(
     body: Body, replicas: int, threads: int, plan: Plan, policy: Maker
 ) -> dict[str, float | None]:
     """Top speed [m/s], kick [m/s] and efficiency of a body with a policy; None for none."""
-    by_battery = rolled_out((body.robot,), plan, policy, SPEEDS, KICKS, replicas, SECONDS, threads)
-    values = scalars(by_battery, body.robot.leg_length).values
+    by_test = rolled_out((body.robot,), plan, policy, SPEEDS, KICKS, replicas, SECONDS, threads)
+    values = scalars(by_test, body.robot.leg_length).values
     return {skill: values.get(skill) for skill in SKILLS}
 
 
@@ -253,9 +253,9 @@ def rolled_out(
         seconds: duration of a roll-out [s].
         threads: threads of native MuJoCo.
     """
-    batteries = (replace(BATTERIES[SPEED], levels=speeds), replace(BATTERIES[PUSH], levels=kicks))
+    tests = (replace(SKILL_TESTS[SPEED], levels=speeds), replace(SKILL_TESTS[PUSH], levels=kicks))
     task = replace(task_of(plan), members=robots)
-    trial = Trial(task, batteries, replicas * len(robots), seconds=seconds, settle=settle(seconds))
+    trial = Trial(task, tests, replicas * len(robots), seconds=seconds, settle=settle(seconds))
     worlds, _ = evaluate(trial, policy, "cpu", engine=NATIVE, threads=threads)
     return curves(worlds)
 

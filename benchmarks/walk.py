@@ -30,8 +30,8 @@ from benchmarks.rows import measured, publish, timed
 from draft.design.references import open_designs
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import NATIVE, WARP, cores
-from draft.learn.measuring.levels import ASCENT, BATTERIES, DESCENT, PUSH, SPEED, WALKING
-from draft.learn.measuring.levels import batteries as named
+from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SKILL_TESTS, SPEED, WALKING
+from draft.learn.measuring.levels import skill_tests as named
 from draft.learn.measuring.rollout.evaluate import evaluate, trained
 from draft.learn.measuring.rollout.review import Level, levels
 from draft.learn.measuring.rollout.trial import Trial
@@ -64,7 +64,7 @@ def main(
     quick: bool = False,
     seeds: tuple[int, ...] = (0, 1, 2),
     out: str = "runs/benchmark",
-    battery: bool = True,
+    tests: bool = True,
     rates: tuple[float, float] | None = None,
 ) -> None:
     """Measure everything, print a table and write it as JSON.
@@ -73,7 +73,7 @@ def main(
         quick: speed and the cheetah's base stage alone.
         seeds: of the trainings; medians count.
         out: folder of the runs.
-        battery: roll out the whole battery of one policy too.
+        tests: roll out all skill tests of one policy too.
         rates: steps per second with learning, on flat and on uneven ground, that minutes are
             counted by; those of each run where left away.
     """
@@ -89,7 +89,7 @@ def main(
     rows += _agree(bases[0])
     if not quick:
         rows += _stages(found, first)
-        rows += _battery(found[0].run("cheetah", "velocity")) if battery else []
+        rows += _tests(found[0].run("cheetah", "velocity")) if tests else []
     publish("walk", rows, cpu=platform.processor(), load=load, seeds=str(seeds))
 
 
@@ -186,9 +186,9 @@ def _stages(found: Sequence[_Seed], first: _First) -> list[dict[str, Any]]:
 
 
 def _asked(run: Run, iteration: int, name: str, *levels_: float, speed: float = 0.0) -> list[Level]:
-    """What a checkpoint does at levels of a battery, 64 robots each."""
-    battery = replace(BATTERIES[name], levels=levels_, walking=speed or WALKING)
-    trial = Trial(task_of(run.plan), (battery,), ROBOTS, seconds=SECONDS, settle=SECONDS / 6)
+    """What a checkpoint does at levels of a test, 64 robots each."""
+    test = replace(SKILL_TESTS[name], levels=levels_, walking=speed or WALKING)
+    trial = Trial(task_of(run.plan), (test,), ROBOTS, seconds=SECONDS, settle=SECONDS / 6)
     return levels(trained(run, iteration, "cpu"), trial, "cpu", NATIVE)
 
 
@@ -217,8 +217,8 @@ def _endures(run: Run, iteration: int) -> bool:
 
 def _agree(run: Run) -> list[dict[str, Any]]:
     """One policy on both engines: difference of its mean speeds, and half of the 95 % interval."""
-    battery = replace(BATTERIES[SPEED], levels=WALKED)
-    trial = Trial(task_of(run.plan), (battery,), ROBOTS, seconds=SECONDS, settle=SECONDS / 6)
+    test = replace(SKILL_TESTS[SPEED], levels=WALKED)
+    trial = Trial(task_of(run.plan), (test,), ROBOTS, seconds=SECONDS, settle=SECONDS / 6)
     policy = trained(run, run.checkpoint()[0], "cpu")
     worlds = {
         engine: evaluate(trial, policy, "cpu", engine=engine, threads=threads)[0]
@@ -236,8 +236,8 @@ def _agree(run: Run) -> list[dict[str, Any]]:
     return rows
 
 
-def _battery(run: Run) -> list[dict[str, Any]]:
-    """The whole battery, 256 replicas, of a policy that sees no ground; stairs by the climber."""
+def _tests(run: Run) -> list[dict[str, Any]]:
+    """All skill tests, 256 replicas, of a policy that sees no ground; stairs by the climber."""
     rows, total = [], 0.0
     climber = open_run(run.folder.with_name(run.folder.name.replace("velocity", "terrain")))
     for words, who in ((("walk", "speed", "push"), run), (("stairs",), climber)):
@@ -245,12 +245,12 @@ def _battery(run: Run) -> list[dict[str, Any]]:
         policy = trained(who, who.checkpoint()[0], "cpu")
         taken, _ = timed(lambda: evaluate(trial, policy, "cpu", engine=NATIVE, threads=cores()))  # noqa: B023
         total += taken
-        rows.append(measured(f"battery: {', '.join(words)}", taken / 60, "min"))
+        rows.append(measured(f"tests: {', '.join(words)}", taken / 60, "min"))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     return [
         *rows,
-        measured("whole battery, 256 replicas", total / 60, "min", 40.0),
-        measured("peak memory of the battery", peak, "GB"),
+        measured("all tests, 256 replicas", total / 60, "min", 40.0),
+        measured("peak memory of the tests", peak, "GB"),
     ]
 
 

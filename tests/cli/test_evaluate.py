@@ -97,7 +97,7 @@ def test_a_design_is_evaluated_with_a_policy(capsys: pytest.CaptureFixture[str])
     assert main([*command, "--levels", "2"]) == 0
     assert ": exists; add --again to repeat it" in capsys.readouterr().out
     policy = str(draft.policy("cheetah", "walk").file)  # It does not observe its design.
-    more = ["--battery", "walk", "--policy", policy, "--out", "there"]
+    more = ["--test", "walk", "--policy", policy, "--out", "there"]
     assert main([*command, *more]) == 0
     assert Path("there/dog-cheetah-walk/nominal-walking/summary.json").is_file()
     assert "humanoid: the robot has 2 legs" in refused(capsys, "humanoid")
@@ -111,9 +111,9 @@ def test_a_design_is_evaluated_with_a_policy(capsys: pytest.CaptureFixture[str])
         ([], "no run is named"),
         (["nowhere"], "'nowhere' is neither a run of 'draft train' nor a design"),
         (["run"], "run has no checkpoint yet"),
-        (["run", "--battery", "swim"], "--battery 'swim' is not known\n  choose from: push, speed"),
-        (["run", "--battery", " , "], "--battery [] is not names among walk"),
-        (["run", "--battery", "speed"], "is for policies of stage velocity, and run is of stage"),
+        (["run", "--test", "swim"], "--test 'swim' is not known\n  choose from: push, speed"),
+        (["run", "--test", " , "], "--test [] is not names among walk"),
+        (["run", "--test", "speed"], "is for policies of stage velocity, and run is of stage"),
         (["run", "--levels", "x"], "--levels 'x' is not a number of levels, or levels above 0"),
         (["run", "--replicas", "0"], "--replicas 0 is not a whole number from 1"),
         (["run", "--seconds", "0.1"], "--seconds 0.1 is not"),
@@ -150,16 +150,16 @@ def test_a_checkpoint_that_is_not_there_is_reported(capsys: pytest.CaptureFixtur
     assert "run has no checkpoint of iteration 5\n  checkpoints: 2" in said
 
 
-def test_each_run_takes_the_batteries_of_its_stage_and_none_is_left(
+def test_each_run_takes_the_tests_of_its_stage_and_none_is_left(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     create(Path("base"), plan(), {})
     create(Path("push"), plan(stage="push"), {})
     both = "base", "push"
     assert "'walk' is for policies of stage base, and push" in refused(
-        capsys, *both, "--battery", "walk"
+        capsys, *both, "--test", "walk"
     )
-    left = refused(capsys, *both, "--battery", "walk,push,speed")
+    left = refused(capsys, *both, "--test", "walk,push,speed")
     assert "'speed' is for policies of stage velocity" in left
 
 

@@ -13,8 +13,8 @@ from draft.learn.measuring.levels import ASCENT, SPEED
 from draft.learn.measuring.rollout.review import Level
 
 
-def level(speed: float, error: float, up: int = 64, battery: str = SPEED) -> Level:
-    return Level(battery, speed, speed - error, error, up, up, 64)
+def level(speed: float, error: float, up: int = 64, test: str = SPEED) -> Level:
+    return Level(test, speed, speed - error, error, up, up, 64)
 
 
 def test_a_robot_walks_that_meets_its_commands_and_stays_up() -> None:
@@ -52,5 +52,5 @@ def test_it_is_said_where_a_policy_does_worse_than_the_one_it_started_from() -> 
     assert worse(before, slower) is None
     falls = [level(1.0, 0.05, up=60), level(3.0, 0.2, up=61), level(5.0, math.nan, up=0)]
     assert worse(falls, before) == "asked for 1.00 m/s, asked for 5.00 m/s"
-    steps = [level(0.1, 0.0, up=40, battery=ASCENT)]
-    assert worse(steps, [level(0.1, 9.0, battery=ASCENT)]) == "steps of 0.1 m up"
+    steps = [level(0.1, 0.0, up=40, test=ASCENT)]
+    assert worse(steps, [level(0.1, 9.0, test=ASCENT)]) == "steps of 0.1 m up"

@@ -29,8 +29,8 @@ DESIGNS = ("cheetah", "bear", "giraffe")
 SPEED = [0.2, 0.4, 0.6, 0.8, 1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 5.5, 6, 7, 8, 10, 12, 14, 17, 20]
 STEPS = [round(0.05 + 0.025 * i, 3) for i in range(19)]
 KICKS = [1 + 0.5 * i for i in range(23)]
-BATTERIES = {"base": ["walk"], "velocity": ["speed"], "terrain": ["ascent", "descent"]}
-BATTERIES |= {"push": ["push"]}
+TESTS = {"base": ["walk"], "velocity": ["speed"], "terrain": ["ascent", "descent"]}
+TESTS |= {"push": ["push"]}
 ITERATIONS = {"base": 1200, "velocity": 1800, "terrain": 2000, "push": 1500}
 # Top speed, step, kick and efficiency that the made-up policies are about.
 ABLE = {
@@ -113,9 +113,9 @@ def evaluated(
     design = run.plan.members[0].name.partition(":")[2]
     values = able(design, run.plan.seed, arm)
     summary = _summary(run, arm, protocol)
-    summary["batteries"] = {name: _battery(name, values) for name in BATTERIES[run.plan.stage]}
+    summary["tests"] = {name: _curve(name, values) for name in TESTS[run.plan.stage]}
     summary["scalars"] = _scalars(run.plan.stage, values, run.plan.members[0].leg_length)
-    levels = {name: _level(name, summary) for name in summary["batteries"]}
+    levels = {name: _level(name, summary) for name in summary["tests"]}
     summary["utilisation_level"] = levels
     counts, planes = _counts(run, levels)
     summary["utilisation"] = {name: _shares(counts[name]) for name in levels}
@@ -158,7 +158,7 @@ def _drop(x: Any, middle: float, width: float) -> list[float]:
     return [round(float(s) * 256) / 256 for s in share]
 
 
-def _battery(name: str, able: tuple[float, float, float, float]) -> dict[str, Any]:
+def _curve(name: str, able: tuple[float, float, float, float]) -> dict[str, Any]:
     speed, step, kick, eta = able
     if name == "speed":
         reached = [speed * math.tanh((x / speed) ** 1.3) ** (1 / 1.3) for x in SPEED]
@@ -210,17 +210,17 @@ def _counts(run: Run, levels: dict[str, float]) -> tuple[Counts, Planes]:
     rng = _rng(run)
     found: Counts = {}
     planes: Planes = {}
-    for battery in levels:
-        found[battery], planes[battery] = {}, {}
+    for test in levels:
+        found[test], planes[test] = {}, {}
         for joint, strong, quick in zip(CLASSES, (2.0, 3.2, 2.6), (1.4, 2.4, 4.2), strict=True):
             torque = rng.beta(strong, 6, 20_000) * 1.05
             speed = rng.beta(quick, 5, 20_000) * 1.15
             for name, values in (("torque", torque), ("speed", speed), ("sum", torque + speed)):
                 bins = np.minimum(values / WIDTH, BINS - 1).astype(int)
-                found[battery][joint, name] = np.bincount(bins, minlength=BINS)
+                found[test][joint, name] = np.bincount(bins, minlength=BINS)
             row, column = (np.minimum(v / CELL, CELLS - 1).astype(int) for v in (torque, speed))
             cells = np.bincount(row * CELLS + column, minlength=CELLS * CELLS)
-            planes[battery][joint] = cells.reshape(CELLS, CELLS)
+            planes[test][joint] = cells.reshape(CELLS, CELLS)
     return found, planes
 
 
@@ -236,19 +236,19 @@ def _parquet(
     folder: Path, counts: Counts, planes: Planes, levels: dict[str, float], name: str
 ) -> None:
     bins = [
-        (battery, levels[battery], name, joint, quantity, bin_, int(count))
-        for battery, found in counts.items()
+        (test, levels[test], name, joint, quantity, bin_, int(count))
+        for test, found in counts.items()
         for (joint, quantity), values in found.items()
         for bin_, count in enumerate(values)
         if count
     ]
     cells = [
-        (battery, levels[battery], name, joint, *at, int(values[tuple(at)]))
-        for battery, found in planes.items()
+        (test, levels[test], name, joint, *at, int(values[tuple(at)]))
+        for test, found in planes.items()
         for joint, values in found.items()
         for at in np.argwhere(values).tolist()
     ]
-    whose = ("battery", "level", "member", "joint")
+    whose = ("test", "level", "member", "joint")
     for file, own, rows in (
         (UTILISATION, ("quantity", "bin", "count"), bins),
         (OCCUPANCY, ("torque", "speed", "count"), cells),
@@ -285,7 +285,7 @@ def family(
     )
     progress(run)
     summary = _summary(run, "nominal", "walking")
-    summary["batteries"] = {}
+    summary["tests"] = {}
     summary["scalars"] = {"top_speed": None}
     summary["reasons"] = {"top_speed": "a family has one for each member"}
     summary["by_member"] = {one.name: _of_member(one, scalars[one.name]) for one in members}
@@ -301,7 +301,7 @@ def _of_member(one: LeggedRobot, speed: float) -> dict[str, Any]:
     return {
         "leg_length": one.leg_length,
         "mass": one.mass,
-        "batteries": {"speed": _battery("speed", (speed, 0.2, 3.0, 0.5))},
+        "tests": {"speed": _curve("speed", (speed, 0.2, 3.0, 0.5))},
         "scalars": {"top_speed": speed, "peak_command": 5.0},
         "limiting": {"speed": {"joint": joint, "by": "speed", "value": 0.97}},
     }

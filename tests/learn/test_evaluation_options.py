@@ -39,7 +39,7 @@ except DraftError as error:
     told["refused"] = str(error)
 run = create(folder / "run", plan(), {})
 (run.folder / "model_1.pt").write_bytes(b"weights")
-asked = prepare(run, Options(battery=["walk"], slope=5.0))
+asked = prepare(run, Options(test=["walk"], slope=5.0))
 told["folder"], told["asked"] = asked.folder.parent.name, asked.request.as_dict()["slope"]
 told["summary"] = "slope" in Summary.model_fields
 job = jobs()["bear-base-0-nominal"]

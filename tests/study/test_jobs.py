@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -58,7 +59,7 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
     assert evaluate == EvaluateRequest(
         run=run,
         checkpoint=2,
-        battery=("push",),
+        test=("push",),
         levels=2,
         replicas=2,
         errors="twins",
@@ -92,6 +93,19 @@ def test_a_training_is_prepared_once_and_starts_from_its_base(tmp_path: Path) ->
     assert runs.open_run(run.folder).plan == run.plan
     with pytest.raises(DraftError, match=r"another plan: rewards\.height differ"):
         jobs()["bear-push-1"].prepare(tmp_path)
+
+
+def test_the_key_of_an_evaluation_keeps_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    hashed: list[Mapping[str, object]] = []
+    monkeypatch.setattr(graphs, "_hash", lambda words: hashed.append(words) or "key")
+    jobs()
+    own = [words for words in hashed if "arm" in words]
+    assert {words["battery"] for words in own} == {"walk", "push"}
+    assert {frozenset(words) - {"errors"} for words in own} == {
+        frozenset(
+            ("run", "battery", "arm", "code", "replicas", "seconds", "seed", "levels", "protocol")
+        )
+    }
 
 
 def test_how_jobs_are_done_goes_to_the_requests_and_not_into_keys(tmp_path: Path) -> None:

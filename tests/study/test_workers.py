@@ -94,7 +94,7 @@ def test_a_fault_is_logged_with_its_traceback(
 
 REQUESTS = (
     TrainRequest(run="a", iterations=3, device="cuda", engine="native", replicas=2, minutes=1.5),
-    EvaluateRequest(run="a", checkpoint=3, battery=("push",), errors="paper", engine="warp"),
+    EvaluateRequest(run="a", checkpoint=3, test=("push",), errors="paper", engine="warp"),
     ReportRequest(study="b"),
 )
 

@@ -40,7 +40,7 @@ def words_of(text: str) -> list[str]:
 @with_options(
     Options,
     without=("protocol", "progress"),
-    read={"battery": words_of, "levels": levels_of},
+    read={"test": words_of, "levels": levels_of},
 )
 def main(
     runs: Annotated[
@@ -64,7 +64,7 @@ def main(
         bool, tyro.conf.arg(help="Use the published protocol, in which one robot in ten stands.")
     ] = False,
     force: Annotated[
-        bool, tyro.conf.arg(help="Allow batteries of other stages; their results are flagged.")
+        bool, tyro.conf.arg(help="Allow skill tests of other stages; their results are flagged.")
     ] = False,
 ) -> int:
     """Measure what trained policies can do: speed, stairs, pushes, efficiency, range, limits."""
@@ -76,13 +76,13 @@ def main(
         "protocol": "published" if published else "walking",
     }
     from draft.learn.measuring import evaluation
-    from draft.learn.measuring.levels import batteries
+    from draft.learn.measuring.levels import skill_tests
 
-    batteries(options.battery or ("speed",), options.levels)  # Check before any run is read.
+    skill_tests(options.test or ("speed",), options.levels)  # Check before any run is read.
     opened = _open(runs, options)
     evaluations = [
-        evaluation.prepare(run, options.model_copy(update=spelt | {"battery": names}))
-        for run, names in zip(opened, _batteries(opened, options.battery, force), strict=True)
+        evaluation.prepare(run, options.model_copy(update=spelt | {"test": names}))
+        for run, names in zip(opened, _tests(opened, options.test, force), strict=True)
     ]
     return _all(evaluations, options)
 
@@ -116,12 +116,10 @@ def _open(names: Sequence[str], options: Options) -> list[Run]:
     return runs
 
 
-def _batteries(
-    runs: Sequence[Run], asked: Sequence[str] | None, force: bool
-) -> list[Sequence[str]]:
-    """Return the names of each run's batteries."""
+def _tests(runs: Sequence[Run], asked: Sequence[str] | None, force: bool) -> list[Sequence[str]]:
+    """Return the names of each run's skill tests."""
     from draft.learn.measuring.evaluation import usual
-    from draft.learn.measuring.levels import batteries, check_stage
+    from draft.learn.measuring.levels import check_stage, skill_tests
 
     found = []
     for run in runs:
@@ -129,11 +127,11 @@ def _batteries(
         own = usual(run)
         names = own if asked is None else asked if force else tuple(n for n in asked if n in own)
         if not names and asked is not None:
-            check_stage(batteries(asked), stage, run.folder)
+            check_stage(skill_tests(asked), stage, run.folder)
         found.append(names)
     for name in asked or ():
         if not any(name in names for names in found):
-            check_stage(batteries((name,)), runs[0].plan.stage, runs[0].folder)
+            check_stage(skill_tests((name,)), runs[0].plan.stage, runs[0].folder)
     return found
 
 
@@ -164,7 +162,7 @@ def _evaluate(evaluation: Evaluation, options: Options) -> Summary:
     from draft.learn.measuring.evaluation import setting
 
     chosen, stepped = setting(options.device, options.engine)
-    names = ", ".join(battery.name for battery in evaluation.batteries)
+    names = ", ".join(test.name for test in evaluation.tests)
     print(f"{evaluation.run.folder}: {names} on {chosen} ({stepped.name}: {stepped.why})")
     with Bar() as bar:
         summary, count = evaluation.measure(chosen, stepped, bar.tell)

@@ -10,7 +10,7 @@ from statistics import median
 
 from draft.errors import counted
 from draft.learn.engine.machine import KINDS, NATIVE, minutes
-from draft.learn.measuring.levels import batteries
+from draft.learn.measuring.levels import skill_tests
 from draft.learn.training.progress import PROGRESS
 from draft.learn.training.run import Plan, Run
 from draft.study.capacity import Capacity
@@ -169,8 +169,8 @@ def hours(job: Job, folder: Path, rates: Rates, anew: bool = False) -> float:
         plan = job.training.plan
         physics = plan.config.physics
         steps = job.options.seconds / (physics.timestep * physics.decimation)
-        levels = batteries(job.options.battery or (), job.options.levels)
-        worlds = sum(len(battery.levels) for battery in levels) * job.options.replicas
+        levels = skill_tests(job.options.test or (), job.options.levels)
+        worlds = sum(len(test.levels) for test in levels) * job.options.replicas
         return worlds * steps / rates.of(plan.stage) / 3600.0
     return 0.0
 

@@ -134,7 +134,7 @@ class Evaluation(Model, RollOuts):
     """Settings of the evaluation."""
 
     levels: Annotated[int | None, Field(ge=1, le=100)] = None
-    """Levels per battery, spread over its range; all by default."""
+    """Levels per skill test, spread over its range; all by default."""
     perturbed: bool = True
     """Whether to evaluate with perturbed inertias too."""
     errors: ErrorSource = "twins"

@@ -63,13 +63,13 @@ def _training(
 
 def _evaluations(study: Study, training: Training) -> list[Evaluating]:
     asked, found = study.evaluate, []
-    battery = STAGES[training.plan.stage].battery
+    test = STAGES[training.plan.stage].test
     for protocol in PROTOCOLS[: 1 + asked.published]:
         for arm in ARMS[: 1 + asked.perturbed]:
             options = Options.of(
                 asked.model_dump(include={*RollOuts.model_fields, "levels"})
                 | {
-                    "battery": (battery,),
+                    "test": (test,),
                     "checkpoint": training.iterations,
                     "errors": asked.errors if arm == "perturbed" else None,
                     "protocol": protocol,
@@ -77,7 +77,7 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
             )
             determinants = {
                 "run": training.key,
-                "battery": battery,
+                "battery": test,  # An older word, which keeps the keys of finished jobs.
                 "arm": arm,
                 "code": [*_code(), FORMAT],
                 **options.model_dump(include={*RollOuts.model_fields, "levels", "protocol"}),

@@ -13,7 +13,7 @@ from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.machine import EngineName
 from draft.learn.measuring import results
 from draft.learn.measuring.evaluation_options import Options
-from draft.learn.measuring.levels import batteries
+from draft.learn.measuring.levels import skill_tests
 from draft.learn.measuring.summary import ARMS, Arm
 from draft.learn.measuring.summary import Request as Asked
 from draft.learn.training import run as runs
@@ -205,7 +205,7 @@ class Training(Job):
 
 @dataclass(frozen=True)
 class Evaluating(Job):
-    """Evaluation of a run by one battery.
+    """Evaluation of a run by one skill test.
 
     Attributes:
         training: job that trains the run.
@@ -247,8 +247,8 @@ class Evaluating(Job):
 
     def asked(self, run: runs.Run) -> Asked:
         """Return everything that determines the result."""
-        words = self.options.battery or ()
-        return results.make_request(run, batteries(words, self.options.levels), self.options)
+        words = self.options.test or ()
+        return results.make_request(run, skill_tests(words, self.options.levels), self.options)
 
     def request(
         self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO

@@ -18,7 +18,7 @@ from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.bodies.payload import with_payload
 from draft.learn.measuring import evaluation
 from draft.learn.measuring.evaluation_options import Options
-from draft.learn.measuring.levels import batteries
+from draft.learn.measuring.levels import skill_tests
 from draft.learn.measuring.results import Request, make_request, result_folder
 from draft.learn.training.run import create
 from draft.model.texts import Text
@@ -63,7 +63,7 @@ def test_a_model_that_draft_did_not_write_is_refused(xml: str) -> None:
 def test_a_result_with_a_payload_is_beside_that_without(tmp_path: Path) -> None:
     run = create(tmp_path / "run", plan(), {})
     (run.folder / "model_1.pt").write_bytes(b"weights")
-    walk = batteries(("walk",))
+    walk = skill_tests(("walk",))
 
     def asked(**more: Any) -> Request:
         return make_request(run, walk, Options(replicas=2, seconds=1.0, **more))
@@ -99,6 +99,6 @@ def test_the_trial_runs_the_loaded_robot(tmp_path: Path) -> None:
 
     run = create(tmp_path / "run", plan(), {})
     (run.folder / "model_1.pt").write_bytes(b"weights")
-    prepared = evaluation.prepare(run, Options(battery=["walk"], replicas=2, payload=10.0))
-    robots: tuple[LeggedRobot, ...] = trial(run, prepared.batteries, prepared.request).task.members
+    prepared = evaluation.prepare(run, Options(test=["walk"], replicas=2, payload=10.0))
+    robots: tuple[LeggedRobot, ...] = trial(run, prepared.tests, prepared.request).task.members
     assert [robot.mass for robot in robots] == [pytest.approx(member().mass + 10)]

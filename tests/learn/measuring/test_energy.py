@@ -23,10 +23,10 @@ from tests.learn.small import member
 ROBOT = replace(member(), mass=20.0, battery=(500.0, 500.0, 500.0))
 
 
-def rolled(*rows: dict[str, float], battery: str = "speed") -> Worlds:
+def rolled(*rows: dict[str, float], test: str = "speed") -> Worlds:
     """Roll-outs that drive with 120 W, brake with 20 W and give off 80 W of heat."""
     usual = {"mechanical": 140.0, "driving": 120.0, "heat": 80.0, "speed": 1.5}
-    return worlds(battery, [usual | row for row in rows])
+    return worlds(test, [usual | row for row in rows])
 
 
 def test_electrical_power_is_driving_power_and_heat_and_braking_counts_as_zero() -> None:
@@ -62,7 +62,7 @@ def test_the_payload_is_moved_too_and_costs_no_range() -> None:
 def test_a_robot_that_does_not_move_forwards_has_no_range_and_says_so(
     row: dict[str, float],
 ) -> None:
-    found = curves(rolled(row, battery="walk"))
+    found = curves(rolled(row, test="walk"))
     add_energy(found, ROBOT)
     assert [found["walk"].get(name) for name in NAMES] == [[None]] * 3
     told = scalars(found, 0.48)
@@ -123,7 +123,7 @@ def test_robots_without_what_was_added_are_recorded_as_before() -> None:
 
 
 def test_a_table_tells_range_and_what_it_rests_on(capsys: pytest.CaptureFixture[str]) -> None:
-    found = curves(rolled({}, battery="walk"))
+    found = curves(rolled({}, test="walk"))
     add_energy(found, member())
     told = scalars(found, 0.48)
     summary = {

@@ -1,4 +1,4 @@
-"""The battery in mjlab with scripted controllers whose scores are known."""
+"""Skill tests in mjlab with scripted controllers whose scores are known."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("mjlab")
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.measuring.levels import BATTERIES, Battery, batteries  # noqa: E402
+from draft.learn.measuring.levels import SKILL_TESTS, SkillTest, skill_tests  # noqa: E402
 from draft.learn.measuring.rollout import evaluate as lab  # noqa: E402
-from draft.learn.measuring.rollout.battery_env import build, env_cfg  # noqa: E402
 from draft.learn.measuring.rollout.evaluate import evaluate, roll_out  # noqa: E402
 from draft.learn.measuring.rollout.measure import Measures  # noqa: E402
 from draft.learn.measuring.rollout.trial import Trial, layout  # noqa: E402
+from draft.learn.measuring.rollout.trial_env import build, env_cfg  # noqa: E402
 from draft.learn.measuring.scalars import Worlds, curves, scalars  # noqa: E402
 from draft.learn.task.config import Config  # noqa: E402
 from draft.learn.task.world.access import GROUND  # noqa: E402
@@ -28,8 +28,8 @@ from tests.learn.small import SMALL  # noqa: E402
 CONFIG = Config().with_values(SMALL)
 
 
-def levels(name: str, *values: float) -> Battery:
-    return replace(BATTERIES[name], levels=values)
+def levels(name: str, *values: float) -> SkillTest:
+    return replace(SKILL_TESTS[name], levels=values)
 
 
 def still(env: Any) -> Any:
@@ -41,7 +41,7 @@ def thrashing(env: Any) -> Any:
     return lambda seen: 100.0 * torch.randn(env.num_envs, 12)
 
 
-def trial(members: Any, *asked: Battery, **more: Any) -> Trial:
+def trial(members: Any, *asked: SkillTest, **more: Any) -> Trial:
     usual: dict[str, Any] = {"replicas": 4, "seconds": 1.0, "settle": 0.2}
     return Trial(Task(members, "velocity", CONFIG), asked, **usual | more)
 
@@ -55,20 +55,20 @@ def family(members: Any) -> Trial:
 
 @pytest.fixture(scope="module")
 def flat(family: Trial) -> Any:
-    return build(family, family.batteries, "cpu")
+    return build(family, family.tests, "cpu")
 
 
 @pytest.fixture(scope="module")
 def stairs(members: Any) -> Any:
-    asked = tuple(replace(b, levels=(0.05, 0.2, 0.5)) for b in batteries(["stairs"]))
+    asked = tuple(replace(test, levels=(0.05, 0.2, 0.5)) for test in skill_tests(["stairs"]))
     of = trial(members[:1], *asked, replicas=1)
     return build(of, asked, "cpu"), layout(of, asked)
 
 
-def test_every_world_has_its_battery_level_replica_and_member(family: Trial, flat: Any) -> None:
-    rows = layout(family, family.batteries)
+def test_every_world_has_its_test_level_replica_and_member(family: Trial, flat: Any) -> None:
+    rows = layout(family, family.tests)
     assert len(rows.level) == flat.num_envs == 3 * 2 * 2
-    assert rows.battery.tolist() == ["walk"] * 4 + ["speed"] * 4 + ["push"] * 4
+    assert rows.test.tolist() == ["walk"] * 4 + ["speed"] * 4 + ["push"] * 4
     assert rows.command.tolist() == [0.0] * 4 + [3.0] * 4 + [0.4] * 4
     assert rows.kick.tolist() == [0.0] * 8 + [2.0] * 4
     assert rows.replica.tolist() == [0, 0, 1, 1] * 3
@@ -79,11 +79,11 @@ def test_every_world_has_its_battery_level_replica_and_member(family: Trial, fla
 def test_replicas_are_shared_out_among_members(members: Any) -> None:
     of = trial(members, levels("walk", 0.4), replicas=4)
     assert of.each == 2
-    assert len(layout(of, of.batteries).level) == 6
+    assert len(layout(of, of.tests).level) == 6
 
 
 def test_a_robot_that_is_held_stands_and_keeps_its_command(family: Trial, flat: Any) -> None:
-    rows, seen_commands = layout(family, family.batteries), []
+    rows, seen_commands = layout(family, family.tests), []
 
     def policy(seen: Any) -> Any:
         seen_commands.append(seen["actor"][:, 45:48].clone())
@@ -129,11 +129,11 @@ def test_equal_seeds_agree_and_others_do_not(members: Any) -> None:
 
 def test_kicks_come_at_three_six_and_nine_seconds(members: Any) -> None:
     of = Trial(Task(members[:1], "push", CONFIG), (levels("push", 1.0, 12.0),), replicas=1)
-    params = env_cfg(of, of.batteries, layout(of, of.batteries)).events["kick"].params
+    params = env_cfg(of, of.tests, layout(of, of.tests)).events["kick"].params
     assert params == {"most": (1.0, 12.0), "steps": (150, 300, 450)}
     for seconds in (0.5, 1.3, 8.1, 12.1):
         short = replace(of, seconds=seconds)
-        steps = env_cfg(short, of.batteries, layout(of, of.batteries)).events["kick"].params
+        steps = env_cfg(short, of.tests, layout(of, of.tests)).events["kick"].params
         assert len(steps["steps"]) == 3
 
 
@@ -163,7 +163,7 @@ def test_kicks_are_drawn_from_the_worlds_square(flat: Any) -> None:
 
 def test_there_are_no_pushes_time_outs_rewards_or_curriculum(members: Any) -> None:
     of = trial(members[:1], levels("speed", 1.0))
-    made = env_cfg(of, of.batteries, layout(of, of.batteries))
+    made = env_cfg(of, of.tests, layout(of, of.tests))
     assert set(made.terminations) == {"tilted", "low", "broken"}
     assert not made.rewards
     assert not made.curriculum
@@ -175,20 +175,20 @@ def test_there_are_no_pushes_time_outs_rewards_or_curriculum(members: Any) -> No
 def test_extra_events_follow_the_designs_and_come_before_the_rest(members: Any) -> None:
     extra: Any = {"more": object()}
     of = trial(members[:2], levels("speed", 1.0), extra=extra)
-    events = env_cfg(of, of.batteries, layout(of, of.batteries)).events
+    events = env_cfg(of, of.tests, layout(of, of.tests)).events
     assert list(events)[:2] == ["designs", "more"]
 
 
 def test_the_published_protocol_lets_a_tenth_stand(members: Any) -> None:
     of = trial(members[:1], levels("speed", 0.2, 2.0), replicas=4000, published=True)
-    rows = layout(of, of.batteries)
+    rows = layout(of, of.tests)
     assert np.mean(~rows.kept) == pytest.approx(0.1, abs=0.01)
     assert not rows.command[~rows.kept].any()
     slow, fast = rows.kept & (rows.level == 0.2), rows.kept & (rows.level == 2.0)
     assert np.mean(rows.command[slow] == 0.3) == pytest.approx(0.2, abs=0.03)
     assert set(rows.command[slow]) == {0.2, 0.3}
     assert set(rows.command[fast]) == {2.0}
-    walking = layout(replace(of, published=False), of.batteries)
+    walking = layout(replace(of, published=False), of.tests)
     assert walking.kept.all()
 
 
@@ -196,14 +196,14 @@ def test_stairs_have_the_requested_heights(stairs: Any) -> None:
     env, rows = stairs
     origins, ground = env.scene.env_origins, env.scene[GROUND]
     out = torch.arange(0.05, 3.9, 0.1)
-    assert rows.battery.tolist() == ["ascent"] * 3 + ["descent"] * 3
-    for world, (battery, height) in enumerate(zip(rows.battery, rows.level, strict=True)):
+    assert rows.test.tolist() == ["ascent"] * 3 + ["descent"] * 3
+    for world, (test, height) in enumerate(zip(rows.test, rows.level, strict=True)):
         for way in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
             xy = origins[world, :2] + out[:, None] * torch.tensor(way)
             heights = ground.ground(xy)
             steps = torch.diff(heights)
             risers = steps[steps.abs() > 1e-4]
-            sign = 1.0 if battery == "ascent" else -1.0
+            sign = 1.0 if test == "ascent" else -1.0
             assert risers.numpy() == pytest.approx(np.full(6, sign * height), abs=1e-4)
             assert heights[-1] == pytest.approx(0.0, abs=1e-5)
             assert heights[0] == pytest.approx(float(origins[world, 2]), abs=1e-4)
@@ -310,7 +310,7 @@ def test_a_replayed_climb_is_traversed_and_a_fall_is_not() -> None:
     rows = {"member": ["a"] * 3, "replica": [0, 1, 2], "kept": [True] * 3}
     plain = {name: np.array(values) for name, values in rows.items()}
     for step, share in ((0.2, 1 / 3), (0.21001, 0.0)):
-        level = {"battery": np.array(["ascent"] * 3), "level": np.full(3, step)}
+        level = {"test": np.array(["ascent"] * 3), "level": np.full(3, step)}
         (curve,) = curves(Worlds(**level, **plain, **columns)).values()
         assert curve.get("traversed") == [pytest.approx(share)]
 

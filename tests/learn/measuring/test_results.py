@@ -13,7 +13,7 @@ import pytest
 
 from draft.learn.bodies.legged import CLASSES
 from draft.learn.measuring.evaluation_options import Options
-from draft.learn.measuring.levels import BATTERIES
+from draft.learn.measuring.levels import SKILL_TESTS
 from draft.learn.measuring.results import (
     OCCUPANCY,
     SUMMARY,
@@ -33,7 +33,7 @@ from tests.learn.measuring.columns import worlds
 from tests.learn.small import plan
 
 parquet = pytest.importorskip("pyarrow.parquet")
-PUSH = replace(BATTERIES["push"], levels=(1.0, 2.0))
+PUSH = replace(SKILL_TESTS["push"], levels=(1.0, 2.0))
 OPTIONS = Options(replicas=2, seed=3)
 
 

@@ -149,7 +149,7 @@ def test_zero_survivors_give_reasons_and_no_number() -> None:
     assert curve["speed"] == curve["eta"] == [None, None]
 
 
-def test_curves_hold_what_each_battery_is_about() -> None:
+def test_curves_hold_what_each_test_is_about() -> None:
     made = curves(both(stood("push", {1.0: 5}), stood("ascent", {0.1: 5}, rise=1.0)))
     assert made["push"].get("recovered") == [0.5]
     assert made["ascent"].get("traversed") == [0.5]

@@ -122,7 +122,7 @@ def test_only_slow_bodies_are_asked_for_the_lower_speeds(monkeypatch: pytest.Mon
     asked: list[tuple[int, float, float]] = []
 
     def recorded(trial: Trial, *args: object, **options: object) -> object:
-        speeds = trial.batteries[0].levels
+        speeds = trial.tests[0].levels
         asked.append((len(trial.task.members), speeds[0], speeds[-1]))
         return evaluate(trial, *args, **options)  # pyright: ignore[reportArgumentType]
 
@@ -280,7 +280,7 @@ def test_the_cost_of_transport_is_electrical_power_per_weight_and_speed() -> Non
     one, count = member(), 4
     ones = np.ones(count)
     worlds = Worlds(
-        battery=np.full(count, "speed"),
+        test=np.full(count, "speed"),
         level=1.0 * ones,
         member=np.full(count, one.name),
         replica=np.arange(count),

@@ -15,7 +15,7 @@ import torch
 from draft.errors import DraftError
 from draft.learn.bodies import inertia
 from draft.learn.measuring.evaluation_options import Options
-from draft.learn.measuring.levels import batteries
+from draft.learn.measuring.levels import skill_tests
 from draft.learn.measuring.results import make_request
 from draft.learn.measuring.rollout.trial import trial
 from draft.learn.task.mdp import events
@@ -186,7 +186,7 @@ def test_an_evaluation_draws_the_requested_errors(
 ) -> None:
     run = create(tmp_path / "run", plan(), {})
     (run.folder / "model_1.pt").write_bytes(b"weights")
-    walk = batteries(("walk",))
+    walk = skill_tests(("walk",))
     what = make_request(run, walk, Options(replicas=2, seconds=1.0, errors=source))
     ranges = [event.params["ranges"] for event in trial(run, walk, what).extra.values()]
     assert ranges == ([] if source is None else [inertia.extents(source)])

@@ -120,7 +120,7 @@ def test_a_stage_is_like_another_and_has_its_own_numbers() -> None:
         """Turn quickly while climbing."""
 
     found = STAGES["slalom"]
-    assert (found.origin, found.shares, found.battery) == ("base", "terrain", "stairs")
+    assert (found.origin, found.shares, found.test) == ("base", "terrain", "stairs")
     assert (is_like("slalom", "terrain"), is_like("slalom", "velocity")) == (True, False)
     assert LAPTOP.ground("slalom") == "uneven"
     config = Config().with_values({"slalom.iterations": 9})

@@ -12,7 +12,7 @@ pytest.importorskip("mjlab")
 
 from draft.errors import DraftError  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
-from draft.learn.measuring.levels import batteries  # noqa: E402
+from draft.learn.measuring.levels import skill_tests  # noqa: E402
 from draft.learn.measuring.rollout.evaluate import evaluate, trained  # noqa: E402
 from draft.learn.measuring.rollout.trial import Trial  # noqa: E402
 from draft.learn.task.config import Config  # noqa: E402
@@ -52,7 +52,7 @@ def test_any_legs_train_and_are_evaluated(name: str, engine: str, tmp_path: Path
     finally:
         trainer.close()
     found_run = open_run(run.folder)
-    walk = batteries(["walk"], [0.3])
+    walk = skill_tests(["walk"], [0.3])
     task = Task(asked.members, "base", asked.config, ground="flat", see_ground=False)
     of = Trial(task, walk, replicas=2, seconds=0.4, settle=0.1)
     worlds, counted = evaluate(of, trained(found_run, 2, "cpu"), "cpu", engine=engine)

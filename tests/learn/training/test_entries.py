@@ -51,9 +51,9 @@ def test_a_result_that_is_there_is_not_measured_again(
     done: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     options: dict[str, Any] = {"levels": 2, "replicas": 4, "seconds": 3.0, "errors": "paper"}
-    write_output(EvaluateRequest(run=str(done), battery=["walk"], **options))
+    write_output(EvaluateRequest(run=str(done), test=["walk"], **options))
     monkeypatch.setattr(evaluation, "setting", lambda *_: pytest.fail("it is measured"))
-    found = learn.evaluate(learn.open_run(done), battery=["walk"], **options)
+    found = learn.evaluate(learn.open_run(done), test=["walk"], **options)
     assert found.arm == "perturbed"
     file = done / "evaluation/perturbed-walking/summary.json"
     assert found == parse(file.read_text())
@@ -64,7 +64,7 @@ def test_a_result_that_is_there_is_not_measured_again(
     [
         ({"errors": "papr"}, "`errors` 'papr' is not known\n  did you mean 'paper'?"),
         ({"protocol": "walk"}, "`protocol` 'walk' is not known\n  did you mean 'walking'?"),
-        ({"battery": ["swim"]}, "`battery` 'swim' is not known"),
+        ({"test": ["swim"]}, "`test` 'swim' is not known"),
         ({"seconds": 0.1}, "`seconds` 0.1 is not a number from 0.5 to 3600 s"),
         ({"checkpoint": 5}, "has no checkpoint of iteration 5"),
     ],

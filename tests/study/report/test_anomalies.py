@@ -24,14 +24,14 @@ def one_run(folder: Path, stage: str, change: Any, seed: int = 0, arm: str = "no
 
 
 def test_a_seed_that_falls_is_named(tmp_path: Path) -> None:
-    one_run(tmp_path, "base", lambda s: s["batteries"]["walk"].update(survival=[0.25]))
+    one_run(tmp_path, "base", lambda s: s["tests"]["walk"].update(survival=[0.25]))
     one_run(tmp_path, "base", None, seed=1)
     words = "cheetah, seed 0, did not learn to walk: 25 % of the roll-outs stay up at 0.4 m/s."
     assert anomalies.anomalies(gather(tmp_path)) == [words]
 
 
 def test_a_seed_that_stands_still_is_named(tmp_path: Path) -> None:
-    one_run(tmp_path, "base", lambda s: s["batteries"]["walk"].update(speed=[0.05]))
+    one_run(tmp_path, "base", lambda s: s["tests"]["walk"].update(speed=[0.05]))
     (said,) = anomalies.not_walking(gather(tmp_path))
     assert "it walks at 0.05 m/s at a command of 0.4 m/s" in said
 

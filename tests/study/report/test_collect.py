@@ -69,6 +69,27 @@ def test_counted_samples_and_training_curves_are_the_same(source: Path, collecte
         np.testing.assert_array_equal(ours.counts[joint, "sum"], theirs.counts[joint, "sum"])
 
 
+def test_evaluations_of_an_older_draft_are_read_by_their_older_words(tmp_path: Path) -> None:
+    from pyarrow import parquet
+
+    new, old = tmp_path / "new", tmp_path / "old"
+    shutil.copytree(synthetic.study(new, **SMALL), old)
+    for path in old.glob("runs/*/evaluation/*/summary.json"):
+        summary = json.loads(path.read_text())
+        path.write_text(json.dumps(summary | {"batteries": summary.pop("tests")}))
+    for path in old.glob("runs/*/evaluation/*/*.parquet"):
+        table = parquet.read_table(path)
+        words = ["battery" if name == "test" else name for name in table.column_names]
+        assert "battery" in words
+        parquet.write_table(table.rename_columns(words), path)
+    (ours, *_), (theirs, *_) = gather(new).evaluations, gather(old).evaluations
+    assert ours.summary.tests.keys() == {"speed"}
+    assert theirs.summary == ours.summary
+    np.testing.assert_equal(theirs.samples["speed"].plane, ours.samples["speed"].plane)
+    np.testing.assert_equal(theirs.samples["speed"].counts, ours.samples["speed"].counts)
+    assert files.texts(gather(old))[RUN] == files.texts(gather(new))[RUN]
+
+
 def test_collecting_again_changes_no_byte(source: Path, tmp_path: Path) -> None:
     out = tmp_path / "three"
     first = collect(source, out)
@@ -104,8 +125,8 @@ def test_samples_are_small_even_if_all_that_torque_and_speed_can_be_is_met(tmp_p
         {joint: cells + 10_000 for joint, cells in samples.plane.items()},
     )
     told = files.SamplesFile.of(full).model_dump()
-    batteries = 3 * 3 * 5  # designs, seeds, batteries
-    assert 1e6 < batteries * len(files.dumps(told)) < 2.6e6
+    records = 3 * 3 * 5  # designs, seeds, tests
+    assert 1e6 < records * len(files.dumps(told)) < 2.6e6
 
 
 def test_what_comes_in_later_is_added(source: Path, tmp_path: Path) -> None:

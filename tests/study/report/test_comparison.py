@@ -91,7 +91,7 @@ def test_a_policy_of_the_other_study_that_does_not_walk_is_named(
 ) -> None:
     other = faster(tmp_path / "other", {"cheetah": 0.01})
     run = synthetic.trained(other, "cheetah", "base", 0)
-    synthetic.evaluated(run, change=lambda s: s["batteries"]["walk"].update(speed=[0.0]))
+    synthetic.evaluated(run, change=lambda s: s["tests"]["walk"].update(speed=[0.0]))
     (said,) = [
         note for note in comparison(gather(main_study), gather(other)).notes if "walk" in note
     ]

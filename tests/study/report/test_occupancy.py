@@ -51,7 +51,7 @@ def test_a_table_may_say_that_no_actuator_limits(
     assert "at 0.9 of its limit or above; below that, nothing does" in table.caption
     assert table.rows[0][-1] == "none; nearest knee, speed 0.83 (3 of 3)"
     assert "<b>" not in to_html(table)
-    assert table.notes == ["No design is limited by its actuators in any battery."]
+    assert table.notes == ["No design is limited by its actuators in any test."]
     use = used.of("quadruped:cheetah", "speed")
     assert use is not None
     assert use.limiting is not None

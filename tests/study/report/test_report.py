@@ -168,11 +168,7 @@ def test_curves_are_medians_over_seeds_level_by_level(source: Path) -> None:
     assert x.tolist() == synthetic.KICKS
     evaluations = list(study.of("quadruped:bear", "perturbed"))
     shares = np.array(
-        [
-            e.summary.batteries["push"].get("recovered")
-            for e in evaluations
-            if "push" in e.summary.batteries
-        ]
+        [e.summary.tests["push"].get("recovered") for e in evaluations if "push" in e.summary.tests]
     )
     assert shares.shape == (3, 23)
     np.testing.assert_allclose(middle, np.median(shares, axis=0))
@@ -180,8 +176,8 @@ def test_curves_are_medians_over_seeds_level_by_level(source: Path) -> None:
 
 
 def test_stairs_are_pooled_as_the_mean_of_up_and_down(source: Path) -> None:
-    one = next(e for e in gather(source).evaluations if "ascent" in e.summary.batteries)
-    up, down = (one.summary.batteries[name].get("traversed", []) for name in ("ascent", "descent"))
+    one = next(e for e in gather(source).evaluations if "ascent" in e.summary.tests)
+    up, down = (one.summary.tests[name].get("traversed", []) for name in ("ascent", "descent"))
     assert list(PANELS["stairs"].points(one.summary).values()) == [
         (a + b) / 2 for a, b in zip(up, down, strict=True)
     ]
@@ -209,9 +205,9 @@ def test_runs_without_evaluations_have_a_table_of_their_training(tmp_path: Path)
 
 def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) -> None:
     def lose(summary: dict[str, Any]) -> None:
-        battery = summary["batteries"]["speed"]
-        battery["survival"] = [0.0] * len(synthetic.SPEED)
-        battery["speed"] = battery["eta"] = [None] * len(synthetic.SPEED)
+        curve = summary["tests"]["speed"]
+        curve["survival"] = [0.0] * len(synthetic.SPEED)
+        curve["speed"] = curve["eta"] = [None] * len(synthetic.SPEED)
         summary["scalars"] = dict.fromkeys(summary["scalars"])
         summary["reasons"] = dict.fromkeys(summary["scalars"], "all fell at every level")
         summary |= {"utilisation": {}, "utilisation_level": {}, "limiting": {}}
@@ -243,7 +239,7 @@ def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) 
         ),
         (
             '{"format": 2, "arm": "nominal", "protocol": "walking", '
-            '"batteries": {"speed": {"levels": [1, 2], "survival": [1, 1], "eta": [1, 1], '
+            '"tests": {"speed": {"levels": [1, 2], "survival": [1, 1], "eta": [1, 1], '
             '"speed": [1]}}}',
             "not have one value for each level",
         ),

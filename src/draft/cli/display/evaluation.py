@@ -124,11 +124,11 @@ def _written(value: float | None) -> str:
 
 
 def _limits(found: Mapping[str, Limiting | None]) -> str:
-    """Return the limiting joint of each battery, or that the nearest to its limit is not near."""
+    """Return the limiting joint of each test, or that the nearest to its limit is not near."""
     return "\n".join(
-        f"{battery}: {'none; nearest ' * ((of['value'] or 0.0) < NEAR)}"
+        f"{test}: {'none; nearest ' * ((of['value'] or 0.0) < NEAR)}"
         f"{of['joint']}, {of['by']} {of['value'] or 0.0:.2f}"
-        for battery, of in found.items()
+        for test, of in found.items()
         if of is not None
     )
 

@@ -110,7 +110,7 @@ def worse(found: Sequence[Level], before: Sequence[Level]) -> str | None:
         _asked(now)
         for now, then in zip(found, before, strict=True)
         if then.up - now.up > (1 - UPRIGHT) * now.robots
-        or (now.battery == SPEED and now.error - then.error > max(MISS, MISSED_SHARE * now.level))
+        or (now.test == SPEED and now.error - then.error > max(MISS, MISSED_SHARE * now.level))
     ]
     return ", ".join(where) or None
 
@@ -122,7 +122,7 @@ def verdict(found: Sequence[Level], iterations: int) -> str:
         found: levels of the review.
         iterations: number of iterations so far.
     """
-    asked = [one for one in found if one.battery == SPEED]
+    asked = [one for one in found if one.test == SPEED]
     fell = sum(one.robots - one.up for one in asked)
     falls = f"{fell} of {sum(one.robots for one in asked)} fall" if fell else "none falls"
     missed = [
@@ -139,16 +139,16 @@ def verdict(found: Sequence[Level], iterations: int) -> str:
 
 
 def _asked(one: Level) -> str:
-    if one.battery == SPEED:
+    if one.test == SPEED:
         return f"asked for {one.level:.2f} m/s"
-    if one.battery == PUSH:
+    if one.test == PUSH:
         return f"kicked with up to {one.level:g} m/s"
-    return f"steps of {one.level:g} m {'up' if one.battery == ASCENT else 'down'}"
+    return f"steps of {one.level:g} m {'up' if one.test == ASCENT else 'down'}"
 
 
 def _stays(one: Level) -> str:
     up = f"{one.up} of {one.robots} stay up"
-    if one.battery != SPEED:
+    if one.test != SPEED:
         return up
     return f"walks at {one.speed:.2f} m/s, {up}" if math.isfinite(one.speed) else f"falls, {up}"
 

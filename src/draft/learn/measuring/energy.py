@@ -37,19 +37,19 @@ def supply_record(member: LeggedRobot) -> dict[str, Any]:
     return {"energy_wh": energy, "band_of_energy_wh": [*map(float, band)], "origin": origin}
 
 
-def add_energy(by_battery: Mapping[str, Curve], member: LeggedRobot, payload: float = 0.0) -> None:
+def add_energy(by_test: Mapping[str, Curve], member: LeggedRobot, payload: float = 0.0) -> None:
     """Add cost of transport, endurance [h] and range [m] to curves that have power and speed.
 
     They are those of the median power and the median speed of a level; None where either is
     missing or not above zero.
 
     Args:
-        by_battery: curves of one robot.
+        by_test: curves of one robot.
         member: the robot.
         payload: mass that it carries [kg], part of the mass that is moved.
     """
     energy, mass = supply(member)[0], member.mass + payload
-    for curve in by_battery.values():
+    for curve in by_test.values():
         pairs = zip(curve.get("power", []), curve["speed"], strict=True)
         rows = [
             travel_of(energy, mass, power, speed) if power and speed and speed > 0 else None

@@ -1,4 +1,4 @@
-"""Evaluation from Python: run a policy through batteries, and save its capabilities."""
+"""Evaluation from Python: run a policy through skill tests, and save its capabilities."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from draft.extras import need
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import Engine, choose, cores, devices
 from draft.learn.measuring.evaluation_options import Options, Report
-from draft.learn.measuring.levels import Battery, batteries, of_stage
+from draft.learn.measuring.levels import SkillTest, of_stage, skill_tests
 from draft.learn.measuring.policies import Source, open_source
 from draft.learn.measuring.results import (
     make_request,
@@ -30,7 +30,7 @@ from draft.learn.training.run import Run, is_run, open_run
 from draft.settings import takes
 from draft.spec import Spec
 
-_FLAT = ("walk", "speed", "push")  # Batteries of a design.
+_FLAT = ("walk", "speed", "push")  # Skill tests of a design.
 
 
 @dataclass(frozen=True, repr=False)
@@ -92,13 +92,13 @@ class Evaluation:
 
     Attributes:
         run: the run.
-        batteries: batteries with their levels.
+        tests: skill tests with their levels.
         request: everything that determines the result.
         folder: folder of the result.
     """
 
     run: Run
-    batteries: tuple[Battery, ...]
+    tests: tuple[SkillTest, ...]
     request: Request
     folder: Path
 
@@ -115,7 +115,7 @@ class Evaluation:
         Args:
             device: "cpu" or "cuda:0" and the like.
             engine: physics engine from `setting`.
-            report: called after every step with the batteries' names, steps done and total steps.
+            report: called after every step with the tests' names, steps done and total steps.
 
         Returns:
             The summary and the number of roll-outs.
@@ -132,12 +132,12 @@ class Evaluation:
             policy = self.run.source.actor(device)
         else:
             policy = trained(self.run, self.request.iteration, device)
-        settings = trial(self.run, self.batteries, self.request)
+        settings = trial(self.run, self.tests, self.request)
         worlds, histograms = evaluate(settings, policy, device, report, engine.name, cores())
         summary = summarise(
             self.run,
             self.request,
-            self.batteries,
+            self.tests,
             worlds,
             histograms,
             device=_device_name(device),
@@ -149,7 +149,7 @@ class Evaluation:
 
 
 def usual(run: Run) -> tuple[str, ...]:
-    """Names of the batteries for the policy of a run; for a design, those without stairs."""
+    """Names of the tests for the policy of a run; for a design, those without stairs."""
     return _FLAT if isinstance(run, Guest) else of_stage(run.plan.stage)
 
 
@@ -183,8 +183,8 @@ def opened(run: Run | Design | Spec | str | Path, policy: str | Path | None = No
 def prepare(run: Run | Design | Spec | str | Path, options: Options) -> Evaluation:
     """Check the options of an evaluation, and find the folder of its result; see `evaluate`."""
     run = run if isinstance(run, Run) else opened(run, options.policy)
-    names = usual(run) if options.battery is None else options.battery
-    chosen = batteries(names, options.levels)
+    names = usual(run) if options.test is None else options.test
+    chosen = skill_tests(names, options.levels)
     request = make_request(run, chosen, options)
     out = None if options.out is None else Path(options.out)
     return Evaluation(run, chosen, request, result_folder(run, request, out))
@@ -196,7 +196,7 @@ def evaluate(run: Run | Design | Spec | str | Path, options: Options) -> Summary
 
         >>> run = draft.train("cheetah", "run", iterations=1, envs=4, replicas=1, device="cpu")
         >>> found = draft.evaluate(
-        ...     run, battery=["walk"], levels=1, replicas=2, seconds=1.0, device="cpu"
+        ...     run, test=["walk"], levels=1, replicas=2, seconds=1.0, device="cpu"
         ... )
         >>> found.scalars["walk_speed"] < 3  # [m/s]
         True
@@ -207,7 +207,7 @@ def evaluate(run: Run | Design | Spec | str | Path, options: Options) -> Summary
 
     Returns:
         Curves, scalars with reasons where there is none, utilisation, flags: the content of
-        summary.json. Results of other stages' batteries are flagged.
+        summary.json. Results of other stages' tests are flagged.
 
     Raises:
         DraftError: numbers out of range, an unknown name, no such checkpoint or device, too little

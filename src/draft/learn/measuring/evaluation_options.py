@@ -52,7 +52,7 @@ class RollOuts(Settings):
 class Target(Settings):
     """What is measured."""
 
-    battery: Annotated[
+    test: Annotated[
         Sequence[Word] | None,
         Field(min_length=1),
         Shown(
@@ -61,13 +61,13 @@ class Target(Settings):
             expects="names among walk, speed, stairs and push",
         ),
     ] = None
-    """Batteries of walk, speed, stairs and push, such as speed,stairs; each run is tested by those
-    of its stage."""
+    """Skill tests of walk, speed, stairs and push, such as speed,stairs; each run takes those of
+    its stage."""
     levels: Annotated[
         int | Sequence[float] | None,
         Shown("N|VALUES", "all", expects="a number of levels, or levels above 0"),
     ] = None
-    """Number of levels, spread over each grid, or a list of the levels of one battery:
+    """Number of levels, spread over each grid, or a list of the levels of one test:
     0.4,1.0,2.0."""
     policy: Annotated[
         str | Path | None, Shown("RUN|FILE.onnx", "the policy of quadrupeds that ships")
@@ -96,4 +96,4 @@ class Options(Extras, RollOuts, Target):
     again: bool = False
     """Repeat evaluations that exist."""
     progress: Annotated[Report | None, Field(exclude=True)] = None
-    """Called after every step with the batteries' names, steps done and total steps."""
+    """Called after every step with the tests' names, steps done and total steps."""

@@ -1,6 +1,6 @@
 """Capabilities that bodies have with one trained policy, from roll-outs.
 
-Each body is rolled out at levels of the batteries `speed` and `push`. The definitions are those
+Each body is rolled out at levels of the skill tests `speed` and `push`. The definitions are those
 of the evaluation of a run (`scalars`), with fewer and shorter roll-outs, of which only
 the last third is measured: fast robots take four seconds to get up to speed.
 """
@@ -23,7 +23,7 @@ from draft.learn.bodies.legged import LeggedRobot, check_family, legged_robot
 from draft.learn.bodies.legged_batch import legged_robots
 from draft.learn.measuring.energy import add_energy
 from draft.learn.measuring.evaluation import setting
-from draft.learn.measuring.levels import BATTERIES, PUSH, SPEED, Battery
+from draft.learn.measuring.levels import PUSH, SKILL_TESTS, SPEED, SkillTest
 from draft.learn.measuring.policies import Source
 from draft.learn.measuring.scalars import Worlds, curves, scalars
 from draft.learn.measuring.utilisation import Histograms, utilisation
@@ -112,14 +112,14 @@ def measure(
     # Most bodies are fastest at one of the upper commands, and need not show what they do at the
     # lower ones.
     levels = speeds(source)
-    lower = replace(BATTERIES[SPEED], levels=levels[: SPEEDS // 2])
-    upper = replace(BATTERIES[SPEED], levels=levels[SPEEDS // 2 :])
-    first = (upper, replace(BATTERIES[PUSH], levels=KICKS))
+    lower = replace(SKILL_TESTS[SPEED], levels=levels[: SPEEDS // 2])
+    upper = replace(SKILL_TESTS[SPEED], levels=levels[SPEEDS // 2 :])
+    first = (upper, replace(SKILL_TESTS[PUSH], levels=KICKS))
     policy = source.actor(device)
     threads = cores() if engine.name == NATIVE else 1
 
     def rolled_out(
-        own: tuple[LeggedRobot, ...], chosen: tuple[Battery, ...], done: int
+        own: tuple[LeggedRobot, ...], chosen: tuple[SkillTest, ...], done: int
     ) -> tuple[Worlds, Histograms]:
         def advance(_: str, step: int, steps: int) -> None:
             # A body has one roll-out, or two: the first counts as half of its time.
@@ -261,13 +261,13 @@ class _One:
 def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
     """Capabilities of one body."""
     own = worlds.of(worlds.member == member.name)
-    by_battery = curves(own)
-    add_energy(by_battery, member)
-    values = scalars(by_battery, member.leg_length).values
+    by_test = curves(own)
+    add_energy(by_test, member)
+    values = scalars(by_test, member.leg_length).values
     level, error = values["peak_command"], math.nan
     if level is not None:
-        error = _error(own.of((own.battery == SPEED) & ~own.fell).at(level).speed)
-    limit = utilisation(histograms, by_battery, values, member.name)["limiting"].get(SPEED)
+        error = _error(own.of((own.test == SPEED) & ~own.fell).at(level).speed)
+    limit = utilisation(histograms, by_test, values, member.name)["limiting"].get(SPEED)
     return _One(
         numbers={name: _number(values.get(name)) for name in MEASURED} | {"top_speed_error": error},
         limiting=f"{limit['joint']} {_LIMITS.get(limit['by'], limit['by'])}" if limit else "",

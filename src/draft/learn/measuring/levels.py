@@ -1,4 +1,4 @@
-"""Evaluation batteries: levels of a commanded speed, of a step's height, or of a kick's size.
+"""Skill tests: levels of a commanded speed, of a step's height, or of a kick's size.
 
 The levels are those of the released code of arXiv 2609.38405.
 """
@@ -21,14 +21,14 @@ SPEED, ASCENT, DESCENT, PUSH, WALK = "speed", "ascent", "descent", "push", "walk
 REPLICAS = 256
 SECONDS, SETTLE = 12.0, 2.0  # Duration of a roll-out, and time at its start not measured [s].
 KICKS = 4  # Parts of a roll-out between which kicks happen: at 3, 6 and 9 s.
-WALKING = 0.4  # Command of all batteries but `speed` [m/s].
+WALKING = 0.4  # Command of all tests but `speed` [m/s].
 # Published protocol: share of robots that stand, smallest vx of those commanded ahead [m/s].
 STANDING, FORWARD_LEAST = 0.1, 0.3
 
 
 @dataclass(frozen=True)
-class Battery:
-    """Levels of one quantity.
+class SkillTest:
+    """Levels of one quantity at which robots are rolled out.
 
     Attributes:
         name: its name.
@@ -59,14 +59,14 @@ _SPEEDS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 5.5,
 # fmt: on
 _STEPS = tuple(round(0.05 + 0.025 * i, 3) for i in range(19))
 _KICKS = tuple(1.0 + 0.5 * i for i in range(23))
-BATTERIES = {
-    battery.name: battery
-    for battery in (
-        Battery(SPEED, "flat", "m/s", _SPEEDS),
-        Battery(ASCENT, "ascent", "m", _STEPS),
-        Battery(DESCENT, "descent", "m", _STEPS),
-        Battery(PUSH, "flat", "m/s", _KICKS),
-        Battery(WALK, "flat", "m/s", (WALKING,)),
+SKILL_TESTS = {
+    test.name: test
+    for test in (
+        SkillTest(SPEED, "flat", "m/s", _SPEEDS),
+        SkillTest(ASCENT, "ascent", "m", _STEPS),
+        SkillTest(DESCENT, "descent", "m", _STEPS),
+        SkillTest(PUSH, "flat", "m/s", _KICKS),
+        SkillTest(WALK, "flat", "m/s", (WALKING,)),
     )
 }
 # Names on the command line, in the order of the published stages.
@@ -78,39 +78,39 @@ _LARGEST = {SPEED: 100.0, ASCENT: 2.0, DESCENT: 2.0, PUSH: 100.0, WALK: 100.0}
 
 
 def of_stage(stage: str) -> tuple[str, ...]:
-    """Return the names of the batteries for policies of a stage."""
-    return (STAGES[stage].battery,)
+    """Return the names of the skill tests for policies of a stage."""
+    return (STAGES[stage].test,)
 
 
-def batteries(
+def skill_tests(
     words: Sequence[str], levels: int | Sequence[float] | None = None
-) -> tuple[Battery, ...]:
-    """Return batteries, with all their levels or with some.
+) -> tuple[SkillTest, ...]:
+    """Return skill tests, with all their levels or with some.
 
     Args:
         words: names in WORDS.
-        levels: number of levels, spread over those of each battery, or the levels themselves of
-            one battery; None for all.
+        levels: number of levels, spread over those of each test, or the levels themselves of
+            one test; None for all.
 
     Raises:
         DraftError: the levels are invalid.
     """
     words = tuple(dict.fromkeys(words))
-    chosen = tuple(BATTERIES[name] for word in words for name in WORDS[word])
+    chosen = tuple(SKILL_TESTS[name] for word in words for name in WORDS[word])
     if levels is None:
         return chosen
     if isinstance(levels, int):
         if levels < 1:
             raise no_levels(str(levels))
-        return tuple(replace(b, levels=spread(b.levels, levels)) for b in chosen)
+        return tuple(replace(test, levels=spread(test.levels, levels)) for test in chosen)
     said, values = ",".join(f"{value:g}" for value in levels), tuple(sorted({*levels}))
     if len(words) > 1:
-        cause = f"`levels` {said} gives the levels of one battery, and there are {len(words)}"
-        raise DraftError(cause, "name one `battery`, or give a number of levels")
+        cause = f"`levels` {said} gives the levels of one test, and there are {len(words)}"
+        raise DraftError(cause, "name one `test`, or give a number of levels")
     largest = _LARGEST[chosen[0].name]
     if not values or not all(0.0 < value <= largest for value in values):
         raise no_levels(said, largest)
-    return tuple(replace(battery, levels=values) for battery in chosen)
+    return tuple(replace(test, levels=values) for test in chosen)
 
 
 def no_levels(given: str, most: float | None = None) -> DraftError:
@@ -140,60 +140,58 @@ def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:
     return tuple(levels[round(i * last / (count - 1))] for i in range(count))
 
 
-def check_stage(chosen: Sequence[Battery], stage: str, run: object) -> None:
-    """Check that batteries are for the stage of a policy.
+def check_stage(chosen: Sequence[SkillTest], stage: str, run: object) -> None:
+    """Check that skill tests are for the stage of a policy.
 
     Args:
-        chosen: the batteries.
+        chosen: the tests.
         stage: stage of the policy.
         run: its run, for the message.
 
     Raises:
         DraftError: one is for another stage.
     """
-    for battery in chosen:
-        if _word(battery) not in of_stage(stage):
+    for test in chosen:
+        if _word(test) not in of_stage(stage):
             cause = (
-                f"battery '{_word(battery)}' is for policies of stage {_stages(battery)}, and "
+                f"test '{_word(test)}' is for policies of stage {_stages(test)}, and "
                 f"{run} is of stage {stage}"
             )
             own = ", ".join(of_stage(stage))
-            raise DraftError(cause, f"use `battery` {own}, or add `force`")
+            raise DraftError(cause, f"use `test` {own}, or add `force`")
 
 
 def flags(
-    chosen: Sequence[Battery], plan: Plan, iteration: int, reached: Reached = UNRECORDED
+    chosen: Sequence[SkillTest], plan: Plan, iteration: int, reached: Reached = UNRECORDED
 ) -> list[str]:
-    """List levels beyond those of the training, and batteries for other stages.
+    """List levels beyond those of the training, and tests for other stages.
 
     Args:
-        chosen: the batteries.
+        chosen: the tests.
         plan: plan of the run.
         iteration: iterations of its checkpoint, at which ramps are evaluated.
         reached: difficulty reached by then.
     """
     notes = []
-    for battery in chosen:
-        if _word(battery) not in of_stage(plan.stage):
+    for test in chosen:
+        if _word(test) not in of_stage(plan.stage):
             notes.append(
-                f"{battery.name}: for policies of stage {_stages(battery)}; this one is of stage "
+                f"{test.name}: for policies of stage {_stages(test)}; this one is of stage "
                 f"{plan.stage}"
             )
-        most = trained(battery.name, plan, iteration, reached)
-        beyond = [level for level in battery.levels if level > most + 1e-9]
+        most = trained(test.name, plan, iteration, reached)
+        beyond = [level for level in test.levels if level > most + 1e-9]
         if beyond:
             ends = " to ".join(f"{level:g}" for level in dict.fromkeys((beyond[0], beyond[-1])))
-            notes.append(
-                f"{battery.name}: trained up to {most:.3g} {battery.unit}; beyond it: {ends}"
-            )
+            notes.append(f"{test.name}: trained up to {most:.3g} {test.unit}; beyond it: {ends}")
     return notes
 
 
 def trained(name: str, plan: Plan, iteration: int, reached: Reached = UNRECORDED) -> float:
-    """Largest level of a battery in the training of a policy, for its smallest design.
+    """Largest level of a test in the training of a policy, for its smallest design.
 
     Args:
-        name: name of the battery.
+        name: name of the test.
         plan: plan of the run.
         iteration: iterations of its checkpoint.
         reached: difficulty reached by then; if not recorded, that at the start of the training.
@@ -222,10 +220,10 @@ def trained(name: str, plan: Plan, iteration: int, reached: Reached = UNRECORDED
     return min(config.commands.forward * root, limited.limit * slowest)
 
 
-def _stages(battery: Battery) -> str:
-    """Names of the stages that a battery is for."""
-    return ", ".join(name for name in STAGES if _word(battery) in of_stage(name))
+def _stages(test: SkillTest) -> str:
+    """Names of the stages that a test is for."""
+    return ", ".join(name for name in STAGES if _word(test) in of_stage(name))
 
 
-def _word(battery: Battery) -> str:
-    return next(word for word, names in WORDS.items() if battery.name in names)
+def _word(test: SkillTest) -> str:
+    return next(word for word, names in WORDS.items() if test.name in names)

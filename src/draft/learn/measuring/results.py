@@ -18,7 +18,7 @@ from draft.extras import need
 from draft.files import new_folder, write
 from draft.learn.measuring.energy import add_energy, supply_record
 from draft.learn.measuring.evaluation_options import Extras, Options
-from draft.learn.measuring.levels import Battery, flags, settle
+from draft.learn.measuring.levels import SkillTest, flags, settle
 from draft.learn.measuring.scalars import Worlds, curves, scalars
 from draft.learn.measuring.summary import ARMS, FORMAT, Request, Summary, parse
 from draft.learn.measuring.utilisation import QUANTITIES, Histograms, utilisation
@@ -38,12 +38,12 @@ _FAMILY = "several designs: see by_member"
 _OF_WALKERS = ("speed", "mechanical", "heat", "driving", "rise")
 
 
-def make_request(run: Run, batteries: Sequence[Battery], options: Options) -> Request:
+def make_request(run: Run, tests: Sequence[SkillTest], options: Options) -> Request:
     """Return the request for an evaluation of a run.
 
     Args:
         run: the run.
-        batteries: batteries with their levels.
+        tests: skill tests with their levels.
         options: the options.
 
     Raises:
@@ -61,7 +61,7 @@ def make_request(run: Run, batteries: Sequence[Battery], options: Options) -> Re
         seconds=options.seconds,
         settle=settle(options.seconds),
         evaluation_seed=options.seed,
-        levels={battery.name: list(battery.levels) for battery in batteries},
+        levels={test.name: list(test.levels) for test in tests},
         **options.model_dump(include={*Extras.model_fields}),
     )
 
@@ -95,7 +95,7 @@ def read(folder: Path) -> Summary | None:
 def summarise(
     run: Run,
     request: Request,
-    batteries: Sequence[Battery],
+    tests: Sequence[SkillTest],
     worlds: Worlds,
     histograms: Histograms,
     **record: str | float,
@@ -105,13 +105,13 @@ def summarise(
     Args:
         run: the run.
         request: everything that determines the result.
-        batteries: batteries with their levels.
+        tests: skill tests with their levels.
         worlds: the roll-outs.
         histograms: histograms of the joints' samples.
         record: `device`, `engine` and `took_s`.
     """
     members = run.plan.members
-    notes = flags(batteries, run.plan, request.iteration, run.reached(request.iteration))
+    notes = flags(tests, run.plan, request.iteration, run.reached(request.iteration))
     asked = request.as_dict()
     return Summary.model_validate(
         {
@@ -161,7 +161,7 @@ def _measured(
         notes += [f"{member.name}: {text}" for text in own]
     names = by_member[members[0].name]["scalars"]
     return {
-        "batteries": curves(worlds, request.regeneration),
+        "tests": curves(worlds, request.regeneration),
         "scalars": dict.fromkeys(names),
         "reasons": dict.fromkeys(names, _FAMILY),
         "by_member": by_member,
@@ -185,7 +185,7 @@ def _of_member(
         "mass": member.mass,
         "top_speed_estimate": member.top_speed,
         "supply": supply_record(member),
-        "batteries": of_member,
+        "tests": of_member,
         "scalars": capabilities.values,
         "reasons": capabilities.reasons,
         **utilisation(histograms, of_member, capabilities.values, member.name),
@@ -225,8 +225,8 @@ def _plane(histograms: Histograms) -> dict[str, np.ndarray]:
 
 
 def _groups(histograms: Histograms, group: np.ndarray, joint: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns with battery, level, design and joint class of each row."""
+    """Columns with test, level, design and joint class of each row."""
     return {
-        **{name: getattr(histograms, name)[group] for name in ("battery", "level", "member")},
+        **{name: getattr(histograms, name)[group] for name in ("test", "level", "member")},
         "joint": np.array(histograms.classes)[joint],
     }

@@ -1,4 +1,4 @@
-"""Curves over the levels of batteries, and one number per capability.
+"""Curves over the levels of skill tests, and one number per capability.
 
 Definitions that the paper leaves open are those of the released code of arXiv 2609.38405. A number
 that roll-outs cannot give is None with a reason, never not-a-number.
@@ -21,7 +21,7 @@ HALF = 0.5  # Share that must recover from a kick, or traverse a step.
 
 
 class Curve(TypedDict, total=False):
-    """Measures over the levels of a battery, one value per level.
+    """Measures over the levels of a skill test, one value per level.
 
     Attributes:
         levels: the levels, rising.
@@ -51,8 +51,8 @@ class Worlds:
     """Roll-outs, one row each.
 
     Attributes:
-        battery: name of the battery.
-        level: level of the battery.
+        test: name of the skill test.
+        level: level of the test.
         member: name of the design.
         replica: number of the replica, from 0.
         fell: whether it fell at any time.
@@ -66,7 +66,7 @@ class Worlds:
     The five measures have no meaning for a roll-out that fell.
     """
 
-    battery: np.ndarray
+    test: np.ndarray
     level: np.ndarray
     member: np.ndarray
     replica: np.ndarray
@@ -158,10 +158,10 @@ def traversed(rows: Worlds, step: float) -> float:
 
 
 def curves(rows: Worlds, regeneration: float = 0.0) -> dict[str, Curve]:
-    """Compute the curve of each battery, by name; see `electrical_power` for the arguments."""
-    by_battery: dict[str, Curve] = {}
-    for name in dict.fromkeys(rows.battery.tolist()):
-        own = rows.of(rows.battery == name)
+    """Compute the curve of each test, by name; see `electrical_power` for the arguments."""
+    by_test: dict[str, Curve] = {}
+    for name in dict.fromkeys(rows.test.tolist()):
+        own = rows.of(rows.test == name)
         levels = np.unique(own.level).tolist()
         each = [own.at(level) for level in levels]
         curve: Curve = {
@@ -177,26 +177,26 @@ def curves(rows: Worlds, regeneration: float = 0.0) -> dict[str, Curve]:
             ]
         elif name == PUSH:
             curve["recovered"] = [survival(one) for one in each]
-        by_battery[name] = curve
-    return by_battery
+        by_test[name] = curve
+    return by_test
 
 
-def scalars(by_battery: Mapping[str, Curve], leg_length: float) -> Scalars:
-    """Compute the capabilities from the curves of batteries.
+def scalars(by_test: Mapping[str, Curve], leg_length: float) -> Scalars:
+    """Compute the capabilities from the curves of skill tests.
 
     Args:
-        by_battery: curves by battery, from `curves`.
+        by_test: curves by test, from `curves`.
         leg_length: leg length of the design [m].
     """
     result = Scalars()
-    if SPEED in by_battery:
-        _speed(result, by_battery[SPEED])
-    if WALK in by_battery:
-        _walk(result, by_battery[WALK])
-    if PUSH in by_battery:
-        _push(result, by_battery[PUSH])
-    if ASCENT in by_battery or DESCENT in by_battery:
-        _stairs(result, by_battery)
+    if SPEED in by_test:
+        _speed(result, by_test[SPEED])
+    if WALK in by_test:
+        _walk(result, by_test[WALK])
+    if PUSH in by_test:
+        _push(result, by_test[PUSH])
+    if ASCENT in by_test or DESCENT in by_test:
+        _stairs(result, by_test)
     for name, one in CAPABILITIES.items():
         if one.law is not None and one.law.of in result.values:
             value, why = result.values[one.law.of], result.reasons.get(one.law.of, "")
@@ -280,11 +280,11 @@ def _push(result: Scalars, curve: Curve) -> None:
         result.flags.append(f"kick: half or more recover at every level, up to {levels[-1]:g} m/s")
 
 
-def _stairs(result: Scalars, by_battery: Mapping[str, Curve]) -> None:
+def _stairs(result: Scalars, by_test: Mapping[str, Curve]) -> None:
     shares = {}
     for name in (ASCENT, DESCENT):
-        if name in by_battery:
-            curve = by_battery[name]
+        if name in by_test:
+            curve = by_test[name]
             crossed = curve.get("traversed", [])
             shares[name] = dict(zip(curve["levels"], crossed, strict=True))
             value = tallest(curve["levels"], crossed)
@@ -293,7 +293,7 @@ def _stairs(result: Scalars, by_battery: Mapping[str, Curve]) -> None:
         return
     levels = [level for level in shares[ASCENT] if level in shares[DESCENT]]
     means = [(shares[ASCENT][level] + shares[DESCENT][level]) / 2 for level in levels]
-    both = [_none_up(by_battery[name]) for name in shares]
+    both = [_none_up(by_test[name]) for name in shares]
     why = _NONE_UP if all(both) else _NO_STEP
     result.put("step", tallest(levels, means), why)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from draft.laws.residuals import ErrorSource
 from draft.learn.measuring.evaluation_options import Extras, Protocol
@@ -36,7 +36,7 @@ class Request(Extras):
         seconds: duration of a roll-out [s].
         settle: time at its start that is not measured [s].
         evaluation_seed: seed of everything random.
-        levels: levels by battery.
+        levels: levels by skill test.
     """
 
     iteration: int
@@ -88,19 +88,22 @@ class Measured(_Record):
         mass: total mass [kg].
         top_speed_estimate: top speed that the motors allow, estimated before [m/s].
         supply: battery; None if an older Draft measured none.
-        batteries: curves by battery.
+        tests: curves by skill test.
         scalars: capabilities by name, see `draft.learn.measuring.scalars`.
         reasons: reason for each scalar that is None.
-        utilisation: 95th percentiles by battery, joint class and quantity, as shares of limits.
-        utilisation_level: level at which they are taken, by battery.
-        limiting: joint class nearest its limit, by battery; None if there is none.
+        utilisation: 95th percentiles by skill test, joint class and quantity, as shares of limits.
+        utilisation_level: level at which they are taken, by test.
+        limiting: joint class nearest its limit, by test; None if there is none.
     """
 
     leg_length: Number = None
     mass: Number = None
     top_speed_estimate: Number = None
     supply: Supply | None = None
-    batteries: dict[str, Curve] = Field(default_factory=dict)
+    # An older Draft wrote them as `batteries`.
+    tests: dict[str, Curve] = Field(
+        default_factory=dict, validation_alias=AliasChoices("tests", "batteries")
+    )
     scalars: dict[str, Number] = Field(default_factory=dict)
     reasons: dict[str, str] = Field(default_factory=dict)
     utilisation: dict[str, dict[str, dict[str, Number]]] = Field(default_factory=dict)
@@ -109,10 +112,10 @@ class Measured(_Record):
 
     @model_validator(mode="after")
     def _check_curves(self) -> Self:
-        for battery, curve in self.batteries.items():
+        for test, curve in self.tests.items():
             for quantity, values in curve.items():
                 if isinstance(values, list) and len(values) != len(curve["levels"]):
-                    what = f"{quantity} of {battery} does not have one value for each level"
+                    what = f"{quantity} of {test} does not have one value for each level"
                     raise ValueError(what)
         return self
 

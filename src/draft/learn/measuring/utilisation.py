@@ -33,13 +33,13 @@ class Histograms:
     """Histograms of roll-outs that did not fall.
 
     Attributes:
-        battery, level, member: labels of each group, shape (groups,).
+        test, level, member: labels of each group, shape (groups,).
         counts: samples per bin, shape (groups, joint classes, quantities, bins).
         plane: samples per cell of torque and speed, shape (groups, joint classes, cells, cells).
         classes: names of the joint classes.
     """
 
-    battery: np.ndarray
+    test: np.ndarray
     level: np.ndarray
     member: np.ndarray
     counts: np.ndarray
@@ -48,20 +48,20 @@ class Histograms:
 
     def with_groups(self, *others: Histograms) -> Histograms:
         """Append the groups of others, of the same joint classes."""
-        names = ("battery", "level", "member", "counts", "plane")
+        names = ("test", "level", "member", "counts", "plane")
         parts = (self, *others)
         joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
         return Histograms(**joined, classes=self.classes)
 
-    def pooled(self, battery: str, level: float, member: str | None = None) -> np.ndarray:
+    def pooled(self, test: str, level: float, member: str | None = None) -> np.ndarray:
         """Sum the counts at a level, shape (classes, quantities, bins).
 
         Args:
-            battery: name of the battery.
-            level: level of the battery.
+            test: name of the test.
+            level: level of the test.
             member: name of one design; None for all.
         """
-        rows = (self.battery == battery) & np.isclose(self.level, level, rtol=0.0, atol=1e-9)
+        rows = (self.test == test) & np.isclose(self.level, level, rtol=0.0, atol=1e-9)
         if member is not None:
             rows &= self.member == member
         return self.counts[rows].sum(0)
@@ -110,12 +110,12 @@ class Limiting(TypedDict):
 
 
 class Utilisation(TypedDict):
-    """Utilisation by battery.
+    """Utilisation by skill test.
 
     Attributes:
-        utilisation: 95th percentiles by battery, joint class and quantity, as shares of limits.
-        utilisation_level: level at which they are taken, by battery.
-        limiting: joint class nearest its limit, by battery.
+        utilisation: 95th percentiles by test, joint class and quantity, as shares of limits.
+        utilisation_level: level at which they are taken, by test.
+        limiting: joint class nearest its limit, by test.
     """
 
     utilisation: dict[str, dict[str, dict[str, float | None]]]
@@ -129,30 +129,30 @@ def utilisation(
     values: Mapping[str, float | None],
     member: str | None = None,
 ) -> Utilisation:
-    """Compute utilisation and limiting joint class of each battery.
+    """Compute utilisation and limiting joint class of each skill test.
 
     The level is the peak command for speed, the tallest step traversed for stairs, the last level
-    that half or more recover from for push, and the only level for walk. A battery without such a
+    that half or more recover from for push, and the only level for walk. A test without such a
     level, or without samples at it, is omitted.
 
     Args:
         histograms: histograms of the samples.
-        curves: curves by battery from `draft.learn.measuring.scalars.curves`.
+        curves: curves by test from `draft.learn.measuring.scalars.curves`.
         values: the scalars.
         member: name of one design; None for all.
     """
     result: Utilisation = {"utilisation": {}, "utilisation_level": {}, "limiting": {}}
-    for battery, curve in curves.items():
-        level = _level(battery, curve, values)
+    for test, curve in curves.items():
+        level = _level(test, curve, values)
         if level is None:
             continue
-        counts = histograms.pooled(battery, level, member)
+        counts = histograms.pooled(test, level, member)
         if not counts.any():
             continue
         shares = {name: _shares(counts[i]) for i, name in enumerate(histograms.classes)}
-        result["utilisation"][battery] = shares
-        result["utilisation_level"][battery] = level
-        result["limiting"][battery] = limiting(shares)
+        result["utilisation"][test] = shares
+        result["utilisation_level"][test] = level
+        result["limiting"][test] = limiting(shares)
     return result
 
 
@@ -173,13 +173,13 @@ def limiting(shares: Mapping[str, Mapping[str, float | None]]) -> Limiting:
     return {"joint": joint, "by": by, "value": of[by]}
 
 
-def _level(battery: str, curve: Curve, values: Mapping[str, float | None]) -> float | None:
-    """Level at which a battery's utilisation is taken; None if its scalar has no value."""
-    if battery == WALK:
+def _level(test: str, curve: Curve, values: Mapping[str, float | None]) -> float | None:
+    """Level at which a test's utilisation is taken; None if its scalar has no value."""
+    if test == WALK:
         return curve["levels"][0]
     names = {SPEED: "peak_command", ASCENT: "step_ascent", DESCENT: "step_descent", PUSH: "kick"}
-    value = values.get(names[battery])
-    if value is None or battery != PUSH:
+    value = values.get(names[test])
+    if value is None or test != PUSH:
         return value
     return max(level for level in curve["levels"] if level <= value + 1e-9)
 

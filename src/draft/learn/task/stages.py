@@ -37,7 +37,7 @@ class Stage:
         like: stage whose changes are made first; None for none.
         shares: group of numbers with the shares of the kinds of ground.
         uneven: whether it needs uneven ground; recipes may train others on a plane.
-        battery: name of the battery that evaluates its policies.
+        test: name of the skill test that evaluates its policies.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Stage:
     like: str | None = None
     shares: Literal["ground", "terrain"] = "ground"
     uneven: bool = False
-    battery: str = "walk"
+    test: str = "walk"
 
     def apply(self, cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
         """Make the changes of the stage, after those of the stage that it is like."""
@@ -183,9 +183,9 @@ def _slow(task: Task) -> tuple[Scaled, Scaled, Scaled]:
 # Stages of the paper, which a study trains unless its file names others.
 PUBLISHED = (
     Stage("base", base, origin=None),
-    Stage("velocity", velocity, battery="speed"),
-    Stage("terrain", terrain, shares="terrain", uneven=True, battery="stairs"),
-    Stage("push", push, battery="push"),
+    Stage("velocity", velocity, test="speed"),
+    Stage("terrain", terrain, shares="terrain", uneven=True, test="stairs"),
+    Stage("push", push, test="push"),
 )
 for _stage in PUBLISHED:
     STAGES.add(_stage.name, _stage, __name__)

@@ -154,7 +154,7 @@ def stage(
     origin: str | None = "base",
     like: str | None = None,
     uneven: bool | None = None,
-    battery: str | None = None,
+    test: str | None = None,
     **numbers: Any,
 ) -> Callable[[F], F]:
     """Register a function as a stage of training: it changes mjlab's configuration in place.
@@ -164,7 +164,7 @@ def stage(
         origin: stage whose policy it starts from; None to start from scratch.
         like: stage whose changes are made first, such as "velocity"; None for none.
         uneven: whether it needs uneven ground; None for that of `like`.
-        battery: battery that evaluates its policies; None for that of `like`, or "walk".
+        test: skill test that evaluates its policies; None for that of `like`, or "walk".
         numbers: number of each parameter after `cfg` and `task`; see `reward`.
 
     Raises:
@@ -175,7 +175,7 @@ def stage(
         "stage",
         own,
         numbers,
-        {"origin": origin, "like": like, "uneven": uneven, "battery": battery},
+        {"origin": origin, "like": like, "uneven": uneven, "test": test},
     )
 
 
@@ -232,7 +232,7 @@ def _stage(
     origin: str | None,
     like: str | None,
     uneven: bool | None,
-    battery: str | None,
+    test: str | None,
 ) -> Stage:
     """Return a stage that is not Draft's own."""
     for other in (origin, like):
@@ -251,7 +251,7 @@ def _stage(
         like,
         first.shares,
         first.uneven if uneven is None else uneven,
-        battery or first.battery,
+        test or first.test,
     )
 
 

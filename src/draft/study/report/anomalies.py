@@ -29,7 +29,7 @@ def not_walking(study: Study) -> Iterator[str]:
     """Yield base policies that fall, or stand still."""
     for design, title in study.titles.items():
         for one in study.of(design, "nominal"):
-            curve = one.summary.batteries.get(WALK)
+            curve = one.summary.tests.get(WALK)
             if not curve:
                 continue
             survival, speed = curve["survival"][0], curve["speed"][0]
@@ -59,7 +59,7 @@ def not_climbing(study: Study) -> Iterator[str]:
 
 def _lowest(study: Study, design: str, arm: str) -> float:
     """Return the lowest step that was tried [m]."""
-    tried = (one.summary.batteries.get(ASCENT) for one in study.of(design, arm))
+    tried = (one.summary.tests.get(ASCENT) for one in study.of(design, arm))
     return min(curve["levels"][0] for curve in tried if curve)
 
 
@@ -91,7 +91,7 @@ def too_efficient(study: Study) -> Iterator[str]:
 
 
 def largest_efficiency(one: Evaluation) -> float | None:
-    """Return the largest efficiency that the counted samples of the speed battery allow.
+    """Return the largest efficiency that the counted samples of the speed test allow.
 
     The efficiency is Pm / (Pm + PJ) with Pm = sum |tau w| and PJ = sum tau^2 w_NL / tau_stall. Each
     sample is taken at the corner of its cell with the least torque in PJ, and at that with the

@@ -50,7 +50,7 @@ class _File(BaseModel):
 
 
 class SamplesFile(_File):
-    """Counted samples of a battery; trailing zeros are cut off."""
+    """Counted samples of a skill test; trailing zeros are cut off."""
 
     bins: dict[Joint, dict[Quantity, Counts]]
     plane: dict[Joint, list[Counts]]
@@ -99,7 +99,7 @@ def _filled(counts: Counts, length: int) -> Array:
 
 
 class EvaluationFile(_File):
-    """Summary of an evaluation, with its samples by battery."""
+    """Summary of an evaluation, with its samples by test."""
 
     summary: Summary
     samples: dict[str, SamplesFile]
@@ -193,8 +193,8 @@ def _run(one: Trained, evaluations: list[Evaluation]) -> RunFile:
 
 def _samples(one: Evaluation) -> dict[str, SamplesFile]:
     return {
-        battery: SamplesFile.of(samples)
-        for battery, samples in one.samples.items()
+        test: SamplesFile.of(samples)
+        for test, samples in one.samples.items()
         if samples.counts or samples.plane
     }
 
@@ -311,7 +311,7 @@ def _rows(path: Path, curve: Mapping[str, list[float | None]]) -> list[dict[str,
 
 def _evaluation(path: Path, run: Trained, name: str, file: EvaluationFile) -> Evaluation:
     try:
-        samples = {battery: cut.samples() for battery, cut in file.samples.items()}
+        samples = {test: cut.samples() for test, cut in file.samples.items()}
     except ValueError:
         raise _broken(path, f"evaluations.{name}: it counts more bins than there are") from None
     made = Evaluation(run, file.summary, samples)

@@ -50,8 +50,8 @@ class Panel:
     falls: bool = True
 
 
-def _values(battery: str, quantity: str, summary: Measured) -> Points:
-    curve = summary.batteries.get(battery)
+def _values(test: str, quantity: str, summary: Measured) -> Points:
+    curve = summary.tests.get(test)
     if curve is None or quantity not in curve:
         return {}
     pairs = zip(curve["levels"], curve[quantity], strict=True)
@@ -59,7 +59,7 @@ def _values(battery: str, quantity: str, summary: Measured) -> Points:
 
 
 def _pooled(summary: Measured) -> Points:
-    up, down = (_values(battery, "traversed", summary) for battery in ("ascent", "descent"))
+    up, down = (_values(test, "traversed", summary) for test in ("ascent", "descent"))
     return {x: (up[x] + down[x]) / 2 for x in up if x in down}
 
 

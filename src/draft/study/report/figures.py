@@ -13,7 +13,7 @@ from draft.files import write
 from draft.learn.task.stages import STAGES
 from draft.plotting import COLUMN
 from draft.study.report import curves, learning, plane
-from draft.study.report.occupancy import BATTERIES, Utilisation
+from draft.study.report.occupancy import TESTS, Utilisation
 from draft.study.report.records import Study
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # Colours of the palette of a picture.
 TINTS = 128
-# Battery -> panels of its curves.
+# Skill test -> panels of its curves.
 CURVES = {
     "speed": ("speed", "survival", "efficiency"),
     "stairs": ("stairs", "ascent", "descent"),
@@ -57,15 +57,15 @@ def single(study: Study, used: Utilisation) -> Iterator[Drawing]:
     if len(shown) > 1:
         yield Drawing("capability", "", "", partial(curves.figure, study, shown))
     names = set[str]()
-    for battery in BATTERIES:
-        for design, use in plane.shown(study, used, battery).items():
+    for test in TESTS:
+        for design, use in plane.shown(study, used, test).items():
             title = study.titles[design]
-            name = f"occupancy_{battery}_" + "".join(c if c.isalnum() else "_" for c in title)
+            name = f"occupancy_{test}_" + "".join(c if c.isalnum() else "_" for c in title)
             while name in names:
                 name += "_"
             names.add(name)
-            make = partial(plane.figure, study, battery, {design: use}, COLUMN)
-            words = f"{title}, {battery}: torque and speed of the joints"
+            make = partial(plane.figure, study, test, {design: use}, COLUMN)
+            words = f"{title}, {test}: torque and speed of the joints"
             yield Drawing(name, "utilisation", words, make)
     drawn = learning.lines(study)
     for stage in STAGES:
@@ -76,19 +76,19 @@ def single(study: Study, used: Utilisation) -> Iterator[Drawing]:
 
 
 def combined(study: Study, used: Utilisation) -> Iterator[Drawing]:
-    """Yield a figure of the panels of each battery and stage."""
-    for battery, panels in CURVES.items():
+    """Yield a figure of the panels of each skill test and stage."""
+    for test, panels in CURVES.items():
         known = [name for name in panels if curves.has(study, name)]
         if known:
-            words = f"Capability by level: {battery}"
+            words = f"Capability by level: {test}"
             caption = " ".join(curves.PANELS[name].caption for name in known)
             make = partial(curves.figure, study, known)
-            yield Drawing(f"curves_{battery}", "curves", words, make, caption)
-    for battery in BATTERIES:
-        if found := plane.shown(study, used, battery):
-            make = partial(plane.figure, study, battery, found, 1.5 * COLUMN)
-            words = f"Torque and speed: {battery}"
-            yield Drawing(f"occupancy_{battery}", "utilisation", words, make)
+            yield Drawing(f"curves_{test}", "curves", words, make, caption)
+    for test in TESTS:
+        if found := plane.shown(study, used, test):
+            make = partial(plane.figure, study, test, found, 1.5 * COLUMN)
+            words = f"Torque and speed: {test}"
+            yield Drawing(f"occupancy_{test}", "utilisation", words, make)
     drawn = learning.lines(study)
     for stage in STAGES:
         if names := learning.quantities(drawn, stage):

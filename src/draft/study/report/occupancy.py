@@ -14,7 +14,7 @@ from draft.learn.measuring.summary import Measured
 from draft.learn.measuring.utilisation import BINS, NEAR, QUANTITIES, percentile
 from draft.study.report.records import Evaluation, Samples, Study
 
-BATTERIES = ("speed", "ascent", "descent", "push", "walk")
+TESTS = ("speed", "ascent", "descent", "push", "walk")
 
 
 class Limit(NamedTuple):
@@ -42,7 +42,7 @@ class Limit(NamedTuple):
 
 @dataclass(frozen=True)
 class Use:
-    """Utilisation of a design in one battery.
+    """Utilisation of a design in one skill test.
 
     Attributes:
         samples: counted samples of all seeds.
@@ -64,22 +64,22 @@ class Utilisation:
         self._found: dict[tuple[str, str], Use] = {}
         for design in study.members:
             evaluations = [one for one in study.of(design, "nominal") if one.summary.utilisation]
-            for battery in BATTERIES:
-                of = [one for one in evaluations if battery in one.summary.utilisation]
+            for test in TESTS:
+                of = [one for one in evaluations if test in one.summary.utilisation]
                 if of:
-                    self._found[design, battery] = _use(battery, of)
+                    self._found[design, test] = _use(test, of)
 
-    def of(self, design: str, battery: str) -> Use | None:
-        """Return the utilisation of a design in a battery; None if it was not measured."""
-        return self._found.get((design, battery))
+    def of(self, design: str, test: str) -> Use | None:
+        """Return the utilisation of a design in a test; None if it was not measured."""
+        return self._found.get((design, test))
 
 
-def _use(battery: str, evaluations: Sequence[Evaluation]) -> Use:
+def _use(test: str, evaluations: Sequence[Evaluation]) -> Use:
     pooled, levels = Samples(), []
     for one in evaluations:
-        if battery in one.levels:
-            levels.append(one.levels[battery])
-            pooled.add(one.samples.get(battery, Samples()))
+        if test in one.levels:
+            levels.append(one.levels[test])
+            pooled.add(one.samples.get(test, Samples()))
     shares = {}
     for joint in CLASSES:
         for quantity in QUANTITIES:
@@ -90,20 +90,19 @@ def _use(battery: str, evaluations: Sequence[Evaluation]) -> Use:
             values = [
                 float(value)
                 for one in evaluations
-                if (value := one.summary.utilisation[battery].get(joint, {}).get(quantity))
-                is not None
+                if (value := one.summary.utilisation[test].get(joint, {}).get(quantity)) is not None
             ]
             if values:
                 shares[joint, quantity] = float(np.median(values))
-    return Use(pooled, shares, levels, limiting(battery, (one.summary for one in evaluations)))
+    return Use(pooled, shares, levels, limiting(test, (one.summary for one in evaluations)))
 
 
-def limiting(battery: str, summaries: Iterable[Measured]) -> Limit | None:
+def limiting(test: str, summaries: Iterable[Measured]) -> Limit | None:
     """Return the limit of most seeds; of two, the one with the larger share."""
     found: Counter[tuple[str, str]] = Counter()
     nearest: dict[tuple[str, str], float] = {}
     for summary in summaries:
-        limit = summary.limiting.get(battery)
+        limit = summary.limiting.get(test)
         if limit is not None and limit["joint"] in CLASSES:
             key = limit["joint"], limit["by"]
             found[key] += 1

@@ -28,12 +28,12 @@ SHARES = (1e-4, 1e-1)
 TICKS = (0, 0.5, 1)
 
 
-def figure(study: Study, battery: str, found: Mapping[str, Use], wide: float) -> Figure:
-    """Draw the planes of a battery: a row for each design, a column for each joint class.
+def figure(study: Study, test: str, found: Mapping[str, Use], wide: float) -> Figure:
+    """Draw the planes of a skill test: a row for each design, a column for each joint class.
 
     Args:
         study: the study.
-        battery: name of the battery.
+        test: name of the test.
         found: utilisation of the designs to draw, see `shown`.
         wide: width of the figure [in].
     """
@@ -45,7 +45,7 @@ def figure(study: Study, battery: str, found: Mapping[str, Use], wide: float) ->
     for row, (design, use) in zip(axes, found.items(), strict=True):
         _row(row, use, study.members[design], color(study, design))
         row[0].set_ylabel("|torque| per peak torque")
-        title = f"{study.titles[design]}: {_battery(battery, use)}"
+        title = f"{study.titles[design]}: {_described(test, use)}"
         row[0].set_title(title, loc="left", fontweight="bold", pad=12)
         for ax, joint in zip(row, CLASSES, strict=True):
             ax.annotate(joint, (0, 1.03), xycoords="axes fraction", color="0.3")
@@ -53,9 +53,9 @@ def figure(study: Study, battery: str, found: Mapping[str, Use], wide: float) ->
     return figure
 
 
-def shown(study: Study, used: Utilisation, battery: str) -> dict[str, Use]:
-    """Return the utilisation of the designs with counts in a battery."""
-    found = {design: used.of(design, battery) for design in study.titles}
+def shown(study: Study, used: Utilisation, test: str) -> dict[str, Use]:
+    """Return the utilisation of the designs with counts in a test."""
+    found = {design: used.of(design, test) for design in study.titles}
     return {design: use for design, use in found.items() if use and use.samples.plane}
 
 
@@ -70,8 +70,8 @@ def _row(axes: Sequence[Axes], use: Use, robot: LeggedRobot, tint: str) -> None:
         _percentiles(ax, joint, use)
 
 
-def _battery(battery: str, use: Use) -> str:
-    """Return battery and levels, in words."""
+def _described(test: str, use: Use) -> str:
+    """Return test and levels, in words."""
     level = few(set(use.levels))
     return {
         "speed": f"sprint at {level} m/s",
@@ -79,7 +79,7 @@ def _battery(battery: str, use: Use) -> str:
         "descent": f"stairs down, {level} m",
         "walk": f"walk at {level} m/s",
         "push": f"kicks of {level} m/s",
-    }[battery]
+    }[test]
 
 
 def _shades(tint: str) -> Colormap:

@@ -22,7 +22,7 @@ Key = tuple[str, str, int]
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Counted samples of a battery at the level of its utilisation.
+    """Counted samples of a skill test at the level of its utilisation.
 
     Attributes:
         counts: samples by bin, shape (BINS,), by joint class and quantity.
@@ -121,7 +121,7 @@ class Evaluation:
     Attributes:
         run: the run.
         summary: its summary.
-        samples: its counted samples by battery, if it is of the nominal arm and one design.
+        samples: its counted samples by test, if it is of the nominal arm and one design.
     """
 
     run: Trained
@@ -145,14 +145,14 @@ class Evaluation:
 
     @property
     def levels(self) -> dict[str, float]:
-        """Level of the utilisation by battery, of the batteries that have one."""
+        """Level of the utilisation by test, of the tests that have one."""
         found = {}
-        for battery in self.summary.utilisation:
-            level = self.summary.utilisation_level.get(battery)
-            if level is None and battery == "speed":
+        for test in self.summary.utilisation:
+            level = self.summary.utilisation_level.get(test)
+            if level is None and test == "speed":
                 level = self.summary.scalars.get("peak_command")
             if level is not None:
-                found[battery] = level
+                found[test] = level
         return found
 
 

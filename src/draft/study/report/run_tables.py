@@ -59,11 +59,11 @@ def evaluations(study: Study) -> Table | None:
     rows: list[list[Cell]] = []
     for (name, stage, protocol), found in groups.items():
         arms = ", ".join(f"{n} {a}" for a, n in sorted(Counter(map(errors.arm, found)).items()))
-        batteries = list(dict.fromkeys(battery for one in found for battery in one.batteries))
+        tests = list(dict.fromkeys(test for one in found for test in one.tests))
         took = [one.took_s for one in found if one.took_s is not None]
         rows.append(
             [
-                *(name, stage, arms, protocol, ", ".join(batteries)),
+                *(name, stage, arms, protocol, ", ".join(tests)),
                 *(few({getattr(one, name) for one in found}) for name in ("replicas", "seconds")),
                 few({one.iteration for one in found}),
                 few({one.device for one in found}),
@@ -79,7 +79,7 @@ def evaluations(study: Study) -> Table | None:
             list(STAGES).index(str(r[1])),
         )
     )
-    titles = ("design", "stage", "evaluations", "protocol", "batteries", "replicas")
+    titles = ("design", "stage", "evaluations", "protocol", "tests", "replicas")
     columns = [Column(title) for title in titles]
     columns += [Column("roll-out", "s"), Column("checkpoint"), Column("device")]
     columns.append(Column("took", "min", 1))

@@ -17,10 +17,11 @@ from draft.study.report.records import Samples
 from draft.values import Array
 
 COLUMNS = {
-    UTILISATION: ("battery", "level", "joint", "quantity", "bin", "count"),
-    OCCUPANCY: ("battery", "level", "joint", "torque", "speed", "count"),
+    UTILISATION: ("test", "level", "joint", "quantity", "bin", "count"),
+    OCCUPANCY: ("test", "level", "joint", "torque", "speed", "count"),
 }
-WORDS = ("battery", "joint", "quantity")
+WORDS = ("test", "joint", "quantity")
+BEFORE = {"test": "battery"}  # Names of columns that an older Draft wrote.
 Columns = dict[str, Any]
 
 
@@ -29,10 +30,10 @@ def read(folder: Path, levels: Mapping[str, float]) -> tuple[dict[str, Samples],
 
     Args:
         folder: folder of the evaluation.
-        levels: level to read, by battery.
+        levels: level to read, by test.
 
     Returns:
-        Samples by battery, and warnings about files that cannot be read.
+        Samples by test, and warnings about files that cannot be read.
 
     Raises:
         DraftError: the extra that reads Parquet is not installed.
@@ -40,9 +41,9 @@ def read(folder: Path, levels: Mapping[str, float]) -> tuple[dict[str, Samples],
     warnings: list[str] = []
     tables = {name: _table(folder / name, warnings) for name in COLUMNS}
     found = {}
-    for battery, level in levels.items():
-        counts = dict(_counts(tables[UTILISATION], battery, level))
-        found[battery] = Samples(counts, dict(_cells(tables[OCCUPANCY], battery, level)))
+    for test, level in levels.items():
+        counts = dict(_counts(tables[UTILISATION], test, level))
+        found[test] = Samples(counts, dict(_cells(tables[OCCUPANCY], test, level)))
     return found, warnings
 
 
@@ -50,8 +51,10 @@ def _table(path: Path, warnings: list[str]) -> Columns | None:
     """Return the columns of a file of counts; None if it cannot be read."""
     parquet = need("pyarrow.parquet")
     try:
-        table = parquet.read_table(path, columns=list(COLUMNS[path.name]))
-        return {name: _column(name, table.column(name)) for name in COLUMNS[path.name]}
+        there = parquet.read_schema(path).names
+        stored = {n: n if n in there else BEFORE.get(n, n) for n in COLUMNS[path.name]}
+        table = parquet.read_table(path, columns=list(stored.values()))
+        return {name: _column(name, table.column(own)) for name, own in stored.items()}
     except (OSError, ValueError, KeyError) as error:  # pyarrow's errors derive from these.
         words = " ".join(str(error).split())[:120]
         where = "/".join(path.parts[-4:])
@@ -72,21 +75,21 @@ def _column(name: str, column: Any) -> Any:
 
 
 def _counts(
-    table: Columns | None, battery: str, level: float
+    table: Columns | None, test: str, level: float
 ) -> Iterator[tuple[tuple[str, str], Array]]:
     """Yield the samples by bin of each joint class and quantity."""
     if table is not None:
-        at = _at(table, battery, level)
+        at = _at(table, test, level)
         for joint, quantity in product(CLASSES, QUANTITIES):
             rows = at & (table["joint"] == joint) & (table["quantity"] == quantity)
             if rows.any():
                 yield (joint, quantity), _total(table, rows, {"bin": BINS})
 
 
-def _cells(table: Columns | None, battery: str, level: float) -> Iterator[tuple[str, Array]]:
+def _cells(table: Columns | None, test: str, level: float) -> Iterator[tuple[str, Array]]:
     """Yield the samples by torque and speed of each joint class, shape (cells, cells)."""
     if table is not None:
-        at = _at(table, battery, level)
+        at = _at(table, test, level)
         for joint in CLASSES:
             rows = at & (table["joint"] == joint)
             if rows.any():
@@ -101,6 +104,6 @@ def _total(table: Columns, rows: Array, axes: Mapping[str, int]) -> Array:
     return total
 
 
-def _at(table: Columns, battery: str, level: float) -> Array:
-    """Return the mask of the rows of a battery's level."""
-    return (table["battery"] == battery) & (np.abs(table["level"] - level) < 1e-6)
+def _at(table: Columns, test: str, level: float) -> Array:
+    """Return the mask of the rows of a test's level."""
+    return (table["test"] == test) & (np.abs(table["level"] - level) < 1e-6)

@@ -9,7 +9,7 @@ from draft.learn.bodies.legged import CLASSES
 from draft.learn.measuring.utilisation import NEAR
 from draft.metrics.capabilities import CAPABILITIES, RANKED, of_table
 from draft.study.report import errors, ordering, run_tables
-from draft.study.report.occupancy import BATTERIES, QUANTITIES, Limit, Utilisation
+from draft.study.report.occupancy import QUANTITIES, TESTS, Limit, Utilisation
 from draft.study.report.ordering import Ordering, by_chance
 from draft.study.report.records import Study
 from draft.study.report.spread import ARM_WORDS, by_seed, few, spread, variation
@@ -17,7 +17,7 @@ from draft.study.report.table import Cell, Column, Strong, Table
 
 NOT_MEASURED = "not evaluated"
 NONE = "none"
-NOT_LIMITED = "No design is limited by its actuators in any battery."
+NOT_LIMITED = "No design is limited by its actuators in any test."
 BEST = "Bold: the highest median of an arm."
 # Captions of the tables of capabilities.
 CAPTIONS = {
@@ -110,8 +110,8 @@ def utilisation(study: Study, used: Utilisation) -> Table | None:
     rows: list[list[Cell]] = []
     limited: list[bool] = []
     for design, title in study.titles.items():
-        for battery in BATTERIES:
-            use = used.of(design, battery)
+        for test in TESTS:
+            use = used.of(design, test)
             if use is None or not use.shares:
                 continue
             limit = use.limiting
@@ -125,10 +125,10 @@ def utilisation(study: Study, used: Utilisation) -> Table | None:
             words = _limit(limit)
             limited += [] if limit is None else [limit.near]
             at = few(set(use.levels)) if use.levels else ""
-            rows.append([title, battery, at, *cells, words])
+            rows.append([title, test, at, *cells, words])
     if not rows:
         return None
-    columns = [Column("design"), Column("battery"), Column("level")]
+    columns = [Column("design"), Column("test"), Column("level")]
     columns += [Column(q, "", 2, joint) for joint in CLASSES for q in QUANTITIES]
     columns.append(Column("limiting joint (seeds)"))
     caption = (

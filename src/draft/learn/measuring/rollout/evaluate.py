@@ -1,4 +1,4 @@
-"""Evaluation in mjlab: all levels of the batteries that share a ground, in one simulation."""
+"""Evaluation in mjlab: all levels of the skill tests that share a ground, in one simulation."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from tensordict import TensorDict
 
 from draft.errors import DraftError
 from draft.learn.engine.machine import WARP
-from draft.learn.measuring.levels import Battery
-from draft.learn.measuring.rollout.battery_env import build
+from draft.learn.measuring.levels import SkillTest
 from draft.learn.measuring.rollout.measure import Measures, each_step
 from draft.learn.measuring.rollout.trial import Trial, layout
+from draft.learn.measuring.rollout.trial_env import build
 from draft.learn.measuring.scalars import Worlds
 from draft.learn.measuring.utilisation import Histograms
 from draft.learn.policy.policy import Policy as NumpyPolicy
@@ -39,13 +39,13 @@ def evaluate(
     engine: str = WARP,
     threads: int = 1,
 ) -> tuple[Worlds, Histograms]:
-    """Roll out all levels: in one environment for the flat batteries, one for the stairs.
+    """Roll out all levels: in one environment for the flat tests, one for the stairs.
 
     Args:
         trial: settings of the evaluation.
         policy: returns the policy for an environment; see `trained`.
         device: "cpu" or "cuda:0" and the like.
-        report: called after every step with the batteries' names, steps done and total steps.
+        report: called after every step with the tests' names, steps done and total steps.
         engine: "native" or "warp".
         threads: threads of native MuJoCo.
 
@@ -56,8 +56,7 @@ def evaluate(
         DraftError: the policy does not fit, or the device has too little memory.
     """
     grounds = [
-        [battery for battery in trial.batteries if (battery.ground == "flat") == flat]
-        for flat in (True, False)
+        [test for test in trial.tests if (test.ground == "flat") == flat] for flat in (True, False)
     ]
     make = partial(build, device=device, engine=engine, threads=threads)
     with _one_thread(device):
@@ -121,7 +120,7 @@ def roll_out(env: ManagerBasedRlEnv, policy: Policy, trial: Trial, report: Repor
     """Run a policy from a fresh start.
 
     Args:
-        env: environment from `draft.learn.measuring.rollout.battery_env.build`.
+        env: environment from `draft.learn.measuring.rollout.trial_env.build`.
         policy: observations to actions.
         trial: settings of the evaluation.
         report: see `evaluate`.
@@ -155,16 +154,16 @@ def _one_thread(device: str) -> Iterator[None]:
 
 def _simulate(
     trial: Trial,
-    batteries: Sequence[Battery],
+    tests: Sequence[SkillTest],
     policy: Callable[[ManagerBasedRlEnv], Policy],
-    make: Callable[[Trial, Sequence[Battery]], ManagerBasedRlEnv],
+    make: Callable[[Trial, Sequence[SkillTest]], ManagerBasedRlEnv],
     device: str,
     report: Report,
 ) -> tuple[Worlds, Histograms]:
-    names = ", ".join(battery.name for battery in batteries)
-    rows = layout(trial, batteries)
+    names = ", ".join(test.name for test in tests)
+    rows = layout(trial, tests)
     try:
-        env = make(trial, batteries)
+        env = make(trial, tests)
         try:
             actor = policy(env)
             measures = roll_out(env, actor, trial, lambda _, step, of: report(names, step, of))
@@ -180,12 +179,12 @@ def _simulate(
         ):
             raise
         cause = f"{len(rows.level)} worlds do not fit into the memory of {device}: {text}"
-        remedy = "use fewer `replicas`, fewer `levels`, or one `battery` at a time"
+        remedy = "use fewer `replicas`, fewer `levels`, or one `test` at a time"
         raise DraftError(cause, remedy) from None
-    kept = {name: getattr(rows, name) for name in ("battery", "level", "member", "replica", "kept")}
+    kept = {name: getattr(rows, name) for name in ("test", "level", "member", "replica", "kept")}
     # The first replica of each level and member gives the labels of its group.
     first = rows.replica == 0
-    groups = {name: getattr(rows, name)[first] for name in ("battery", "level", "member")}
+    groups = {name: getattr(rows, name)[first] for name in ("test", "level", "member")}
     classes = trial.task.members[0].classes
     counted = Histograms(**groups, counts=samples[0], plane=samples[1], classes=classes)
     return Worlds(**kept, **columns), counted

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from draft.learn.engine.machine import NATIVE, cores
-from draft.learn.measuring.levels import ASCENT, BATTERIES, DESCENT, PUSH, SPEED
+from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SKILL_TESTS, SPEED
 from draft.learn.measuring.rollout.evaluate import Policy, evaluate, exported, trained
 from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.policy.policy import open_policy
@@ -36,7 +36,7 @@ class Level:
     """Measures at one level.
 
     Attributes:
-        battery: name of the battery.
+        test: name of the skill test.
         level: commanded speed [m/s], height of a step [m], or size of a kick [m/s].
         speed: median forward speed of the robots that stay up [m/s]; NaN for none.
         error: mean of their |speed - command| [m/s]; NaN for none.
@@ -45,7 +45,7 @@ class Level:
         robots: number of robots.
     """
 
-    battery: str
+    test: str
     level: float
     speed: float
     error: float
@@ -100,11 +100,11 @@ def _origin(run: Run, device: str) -> Maker | None:
 
 def _trial(run: Run, replicas: int) -> Trial:
     """Settings of the review of a run."""
-    chosen = [replace(BATTERIES[SPEED], levels=speeds(run))]
+    chosen = [replace(SKILL_TESTS[SPEED], levels=speeds(run))]
     if is_like(run.plan.stage, "terrain"):
-        chosen += [replace(BATTERIES[name], levels=STEPS) for name in (ASCENT, DESCENT)]
+        chosen += [replace(SKILL_TESTS[name], levels=STEPS) for name in (ASCENT, DESCENT)]
     if is_like(run.plan.stage, "push"):
-        chosen += [replace(BATTERIES[PUSH], levels=KICKS)]
+        chosen += [replace(SKILL_TESTS[PUSH], levels=KICKS)]
     task = task_of(run.plan)
     # Draws fill the region evenly from the first on.
     task = replace(task, members=task.members[:replicas])
@@ -123,15 +123,15 @@ def levels(policy: Maker, trial: Trial, device: str, engine: str) -> list[Level]
     threads = cores() if engine == NATIVE else 1
     worlds, _ = evaluate(trial, policy, device, engine=engine, threads=threads)
     measured = []
-    for battery in trial.batteries:
-        for level in battery.levels:
-            rows = (worlds.battery == battery.name) & (worlds.level == level)
+    for test in trial.tests:
+        for level in test.levels:
+            rows = (worlds.test == test.name) & (worlds.level == level)
             up = rows & ~worlds.fell
-            speed, command = worlds.speed[up], battery.command(level)
+            speed, command = worlds.speed[up], test.command(level)
             known = bool(len(speed))
             measured.append(
                 Level(
-                    battery=battery.name,
+                    test=test.name,
                     level=level,
                     speed=float(np.median(speed)) if known else float("nan"),
                     error=float(np.abs(speed - command).mean()) if known else float("nan"),

@@ -1,7 +1,7 @@
 """Settings of an evaluation in mjlab, and the assignment of its worlds.
 
-Each world belongs to one battery, level, replica and member. Members alternate from world to world,
-as in training.
+Each world belongs to one skill test, level, replica and member. Members alternate from world to
+world, as in training.
 """
 
 from __future__ import annotations
@@ -13,7 +13,14 @@ import numpy as np
 from mjlab.managers.event_manager import EventTermCfg
 
 from draft.learn.bodies.payload import with_payload
-from draft.learn.measuring.levels import FORWARD_LEAST, REPLICAS, SECONDS, SETTLE, STANDING, Battery
+from draft.learn.measuring.levels import (
+    FORWARD_LEAST,
+    REPLICAS,
+    SECONDS,
+    SETTLE,
+    STANDING,
+    SkillTest,
+)
 from draft.learn.measuring.summary import Request
 from draft.learn.task.mdp.events import inertia_errors
 from draft.learn.task.world.task import Task
@@ -26,8 +33,8 @@ class Trial:
     """Settings of an evaluation.
 
     Attributes:
-        task: robots and numbers; the batteries determine the ground.
-        batteries: batteries with their levels.
+        task: robots and numbers; the skill tests determine the ground.
+        tests: skill tests with their levels.
         replicas: roll-outs of each level, divided equally among the members and rounded up.
         published: whether some robots stand and some are commanded at least 0.3 m/s, as in the
             released code of the paper.
@@ -38,7 +45,7 @@ class Trial:
     """
 
     task: Task
-    batteries: tuple[Battery, ...]
+    tests: tuple[SkillTest, ...]
     replicas: int = REPLICAS
     published: bool = False
     seed: int = 0
@@ -57,13 +64,13 @@ class Layout:
     """Assignment of the worlds, one row per world.
 
     Attributes:
-        battery, level, member, replica, kept: see `draft.learn.measuring.scalars.Worlds`.
+        test, level, member, replica, kept: see `draft.learn.measuring.scalars.Worlds`.
         command: commanded forward speed [m/s].
         kick: largest kick along x and y [m/s].
-        ground: see `Battery.ground`.
+        ground: see `SkillTest.ground`.
     """
 
-    battery: np.ndarray
+    test: np.ndarray
     level: np.ndarray
     member: np.ndarray
     replica: np.ndarray
@@ -73,16 +80,16 @@ class Layout:
     ground: np.ndarray
 
 
-def layout(trial: Trial, batteries: Sequence[Battery]) -> Layout:
-    """Assign the worlds of a simulation, ordered by battery, level, replica and member."""
+def layout(trial: Trial, tests: Sequence[SkillTest]) -> Layout:
+    """Assign the worlds of a simulation, ordered by test, level, replica and member."""
     names = [member.name for member in trial.task.members]
     size = trial.each * len(names)
-    levels = [(battery, level) for battery in batteries for level in battery.levels]
+    levels = [(test, level) for test in tests for level in test.levels]
 
     def of_levels(values: Sequence[str | float]) -> np.ndarray:
         return np.repeat(np.array(values), size)
 
-    command = of_levels([battery.command(level) for battery, level in levels])
+    command = of_levels([test.command(level) for test, level in levels])
     kept = np.ones(len(command), dtype=bool)
     if trial.published:
         drawn = np.random.default_rng(trial.seed).random((2, len(command)))
@@ -90,23 +97,23 @@ def layout(trial: Trial, batteries: Sequence[Battery]) -> Layout:
         ahead = drawn[1] < trial.task.config.commands.forward_only
         command = np.where(ahead, np.maximum(command, FORWARD_LEAST), command) * kept
     return Layout(
-        battery=of_levels([battery.name for battery, _ in levels]),
+        test=of_levels([test.name for test, _ in levels]),
         level=of_levels([level for _, level in levels]),
         member=np.tile(np.array(names), len(levels) * trial.each),
         replica=np.tile(np.repeat(np.arange(trial.each), len(names)), len(levels)),
         kept=kept,
         command=command,
-        kick=of_levels([battery.kick(level) for battery, level in levels]),
-        ground=of_levels([battery.ground for battery, _ in levels]),
+        kick=of_levels([test.kick(level) for test, level in levels]),
+        ground=of_levels([test.ground for test, _ in levels]),
     )
 
 
-def trial(run: Run, batteries: Sequence[Battery], request: Request) -> Trial:
+def trial(run: Run, tests: Sequence[SkillTest], request: Request) -> Trial:
     """Return the settings of an evaluation of a run's policy.
 
     Args:
         run: the run.
-        batteries: batteries with their levels.
+        tests: skill tests with their levels.
         request: everything that determines the result.
 
     Raises:
@@ -117,7 +124,7 @@ def trial(run: Run, batteries: Sequence[Battery], request: Request) -> Trial:
         extra = inertia_errors(run.plan.members, request.errors)
     return Trial(
         task=replace(task_of(run.plan), members=with_payload(run.plan.members, request.payload)),
-        batteries=tuple(batteries),
+        tests=tuple(tests),
         replicas=request.replicas,
         published=request.protocol == "published",
         seed=request.evaluation_seed,

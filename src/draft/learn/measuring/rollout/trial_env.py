@@ -1,4 +1,4 @@
-"""Environment of batteries: every world has its own command, kick and patch of stairs."""
+"""Environment of a trial: every world has its own command, kick and patch of stairs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from mjlab.terrains.terrain_generator import SubTerrainCfg, TerrainOutput
 
 from draft.learn.engine.machine import WARP
 from draft.learn.engine.worlds.simulate import make
-from draft.learn.measuring.levels import KICKS, Battery
+from draft.learn.measuring.levels import KICKS, SkillTest
 from draft.learn.measuring.rollout.measure import EACH_STEP
 from draft.learn.measuring.rollout.trial import Layout, Trial, layout
 from draft.learn.task.groups import Ground
@@ -35,32 +35,32 @@ COLUMNS = {"descent": "stairs", "ascent": "stairs_pit"}
 
 
 def build(
-    trial: Trial, batteries: Sequence[Battery], device: str, engine: str = WARP, threads: int = 1
+    trial: Trial, tests: Sequence[SkillTest], device: str, engine: str = WARP, threads: int = 1
 ) -> ManagerBasedRlEnv:
-    """Make the environment of batteries that share a ground, not yet reset.
+    """Make the environment of skill tests that share a ground, not yet reset.
 
     Args:
         trial: settings of the evaluation.
-        batteries: the batteries, all flat or all on stairs.
+        tests: the tests, all flat or all on stairs.
         device: "cpu" or "cuda:0" and the like.
         engine: "native" or "warp".
         threads: threads of native MuJoCo.
     """
-    rows = layout(trial, batteries)
+    rows = layout(trial, tests)
     # mjlab prints the environment as long tables.
     with contextlib.redirect_stdout(io.StringIO()):
-        env = make(env_cfg(trial, batteries, rows), device, engine, threads)
+        env = make(env_cfg(trial, tests, rows), device, engine, threads)
     if rows.ground[0] != "flat":
-        _place(env, rows, _heights(batteries))
+        _place(env, rows, _heights(tests))
     command = torch.zeros(len(rows.command), 3, device=env.device)
     command[:, 0] = torch.from_numpy(rows.command).to(env.device)
     command_term(env).hold(command)
     return env
 
 
-def env_cfg(trial: Trial, batteries: Sequence[Battery], rows: Layout) -> ManagerBasedRlEnvCfg:
+def env_cfg(trial: Trial, tests: Sequence[SkillTest], rows: Layout) -> ManagerBasedRlEnvCfg:
     """Configuration of the environment, without rewards, curriculum, pushes and time-outs."""
-    heights = _heights(batteries)
+    heights = _heights(tests)
     task = replace(trial.task, seed=trial.seed, ground="uneven" if heights else "flat")
     if heights:
         task = replace(
@@ -103,9 +103,9 @@ def _events(trial: Trial, cfg: ManagerBasedRlEnvCfg, rows: Layout) -> dict[str, 
     return {**first, **trial.extra, **terms}
 
 
-def _heights(batteries: Sequence[Battery]) -> tuple[float, ...]:
+def _heights(tests: Sequence[SkillTest]) -> tuple[float, ...]:
     """Step heights of all stairs, one row of patches each."""
-    return tuple(sorted({n for b in batteries if b.ground != "flat" for n in b.levels}))
+    return tuple(sorted({n for test in tests if test.ground != "flat" for n in test.levels}))
 
 
 @dataclass(kw_only=True)

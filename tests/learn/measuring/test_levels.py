@@ -1,4 +1,4 @@
-"""Batteries: their grids, what a run is asked, and what is beyond its training."""
+"""Skill tests: their grids, what a run is asked, and what is beyond its training."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import pytest
 
 from draft.errors import DraftError
 from draft.learn.measuring.levels import (
-    BATTERIES,
+    SKILL_TESTS,
     Reached,
-    batteries,
     check_stage,
     flags,
     of_stage,
+    skill_tests,
     spread,
     trained,
 )
@@ -21,24 +21,24 @@ from tests.learn.small import plan
 
 
 def test_grids_are_those_of_the_study() -> None:
-    counts = {name: len(battery.levels) for name, battery in BATTERIES.items()}
+    counts = {name: len(test.levels) for name, test in SKILL_TESTS.items()}
     assert counts == {"speed": 22, "ascent": 19, "descent": 19, "push": 23, "walk": 1}
-    ends = {name: (b.levels[0], b.levels[-1]) for name, b in BATTERIES.items()}
+    ends = {name: (one.levels[0], one.levels[-1]) for name, one in SKILL_TESTS.items()}
     assert ends["speed"] == (0.2, 20.0)
     assert ends["ascent"] == ends["descent"] == (0.05, 0.5)
     assert ends["push"] == (1.0, 12.0)
-    assert BATTERIES["ascent"].levels[1] == 0.075
+    assert SKILL_TESTS["ascent"].levels[1] == 0.075
 
 
 def test_only_speeds_are_commanded_and_only_kicks_kick() -> None:
-    speed, push, stairs = BATTERIES["speed"], BATTERIES["push"], BATTERIES["ascent"]
+    speed, push, stairs = SKILL_TESTS["speed"], SKILL_TESTS["push"], SKILL_TESTS["ascent"]
     assert (speed.command(3.0), speed.kick(3.0)) == (3.0, 0.0)
     assert (push.command(3.0), push.kick(3.0)) == (0.4, 3.0)
     assert (stairs.command(0.3), stairs.kick(0.3)) == (0.4, 0.0)
 
 
-def test_stairs_are_both_ways_and_each_stage_has_its_batteries() -> None:
-    assert [battery.name for battery in batteries(["stairs"])] == ["ascent", "descent"]
+def test_stairs_are_both_ways_and_each_stage_has_its_tests() -> None:
+    assert [test.name for test in skill_tests(["stairs"])] == ["ascent", "descent"]
     assert [of_stage(s) for s in ("base", "velocity", "terrain", "push")] == [
         ("walk",),
         ("speed",),
@@ -48,27 +48,27 @@ def test_stairs_are_both_ways_and_each_stage_has_its_batteries() -> None:
 
 
 def test_fewer_levels_are_spread_from_the_first_to_the_last() -> None:
-    assert batteries(["push", "push"], 3)[0].levels == (1.0, 6.5, 12.0)
+    assert skill_tests(["push", "push"], 3)[0].levels == (1.0, 6.5, 12.0)
     assert spread((1.0, 2.0, 3.0), 1) == (1.0,)
     assert spread((1.0, 2.0, 3.0), 9) == (1.0, 2.0, 3.0)
-    assert batteries(["speed"], [2.0, 0.4, 2])[0].levels == (0.4, 2.0)
+    assert skill_tests(["speed"], [2.0, 0.4, 2])[0].levels == (0.4, 2.0)
 
 
 @pytest.mark.parametrize("levels", [0, -3, [-1, 2], [], [math.nan, 1], [math.inf, 2], [0.1, 1e9]])
 def test_levels_that_make_no_sense_are_refused(levels: int | list[float]) -> None:
     with pytest.raises(DraftError, match="`levels`"):
-        batteries(["speed"], levels)
+        skill_tests(["speed"], levels)
 
 
-def test_levels_of_several_batteries_are_refused() -> None:
+def test_levels_of_several_tests_are_refused() -> None:
     with pytest.raises(DraftError, match="there are 2"):
-        batteries(["speed", "push"], [1.0, 2.0])
+        skill_tests(["speed", "push"], [1.0, 2.0])
 
 
-def test_a_battery_of_another_stage_is_refused() -> None:
-    check_stage(batteries(["speed"]), "velocity", "run")
+def test_a_test_of_another_stage_is_refused() -> None:
+    check_stage(skill_tests(["speed"]), "velocity", "run")
     with pytest.raises(DraftError, match="'stairs' is for policies of stage terrain, and run is"):
-        check_stage(batteries(["stairs"]), "velocity", "run")
+        check_stage(skill_tests(["stairs"]), "velocity", "run")
 
 
 @pytest.mark.parametrize(
@@ -106,9 +106,9 @@ def test_growing_commands_are_trained_up_to_the_fastest_commanded() -> None:
 
 
 def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
-    assert flags(batteries(["stairs"]), plan(stage="terrain"), 2000, Reached(row=9.0)) == []
+    assert flags(skill_tests(["stairs"]), plan(stage="terrain"), 2000, Reached(row=9.0)) == []
     told = flags(
-        batteries(["stairs"], [0.1, 0.2, 0.4]),
+        skill_tests(["stairs"], [0.1, 0.2, 0.4]),
         plan(stage="terrain", values={"ground.rows": 10}),
         2000,
         Reached(row=3.0),
@@ -117,7 +117,7 @@ def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
         "ascent: trained up to 0.233 m; beyond it: 0.4",
         "descent: trained up to 0.233 m; beyond it: 0.4",
     ]
-    (told,) = flags(batteries(["speed"]), plan(stage="velocity"), 1800)
+    (told,) = flags(skill_tests(["speed"]), plan(stage="velocity"), 1800)
     assert told == "speed: trained up to 15 m/s; beyond it: 17 to 20"
-    told = flags(batteries(["walk"]), plan(stage="velocity"), 1800)
+    told = flags(skill_tests(["walk"]), plan(stage="velocity"), 1800)
     assert told == ["walk: for policies of stage base; this one is of stage velocity"]

@@ -1,8 +1,8 @@
-"""How much faster a whole battery is in one simulation than with one environment per level.
+"""How much faster skill tests are in one simulation than with one environment per level.
 
-`python -m benchmarks.battery` builds and rolls out the same levels, replicas and seconds both
+`python -m benchmarks.skill_tests` builds and rolls out the same levels, replicas and seconds both
 ways, side by side in one process after kernels are compiled, prints a table with peak memory and
-writes `benchmarks/results/battery.json`. Builds count. On a GPU it is the whole battery with 256
+writes `benchmarks/results/skill_tests.json`. Builds count. On a GPU it is all levels with 256
 replicas; on a CPU fewer replicas, levels and seconds, which `--replicas`, `--levels` and
 `--seconds` change.
 """
@@ -20,7 +20,7 @@ import tyro
 import draft
 from benchmarks.rows import measured, publish, timed
 from draft.learn.bodies.legged import legged_robot
-from draft.learn.measuring.levels import SECONDS, Battery, batteries
+from draft.learn.measuring.levels import SECONDS, SkillTest, skill_tests
 from draft.learn.measuring.rollout.evaluate import evaluate
 from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.task.world.task import Task
@@ -38,7 +38,7 @@ def main(
 
     Args:
         replicas: of each level; 256 on a GPU, 2 on a CPU.
-        levels: of each battery; all where None.
+        levels: of each test; all where None.
         seconds: of a roll-out; 12 on a GPU, 0.5 on a CPU.
         device: cuda:0 or cpu; the GPU if there is one.
     """
@@ -48,11 +48,9 @@ def main(
     where = torch.cuda.get_device_name(device) if gpu else f"CPU ({platform.processor()})"
     rows, sums, peak = [], [0.0, 0.0], 0.0
     for word, stage in STAGES.items():
-        found = batteries((word,), levels)
+        found = skill_tests((word,), levels)
         trial = _trial(stage, found, replicas, seconds)
-        alone = [
-            replace(trial, batteries=(replace(b, levels=(n,)),)) for b in found for n in b.levels
-        ]
+        alone = [replace(trial, tests=(replace(t, levels=(n,)),)) for t in found for n in t.levels]
         for warm in (trial, alone[0]):  # Kernels are compiled on the first steps.
             _run(replace(warm, seconds=0.1, settle=0.02), device)
         before = _memory(device)
@@ -66,12 +64,12 @@ def main(
             measured(f"{word}: ratio", apart / together, "x"),
             measured(f"{word}: memory of the simulation", most - before, "MB"),
         ]
-    rows.append(measured("whole battery: ratio", sums[1] / sums[0], "x", 5.0, True))
+    rows.append(measured("all tests: ratio", sums[1] / sums[0], "x", 5.0, True))
     rows.append(measured("peak memory", peak, "MB"))
-    publish("battery", rows, device=where, replicas=str(replicas), seconds=f"{seconds:g}")
+    publish("skill_tests", rows, device=where, replicas=str(replicas), seconds=f"{seconds:g}")
 
 
-def _trial(stage: str, found: tuple[Battery, ...], replicas: int, seconds: float) -> Trial:
+def _trial(stage: str, found: tuple[SkillTest, ...], replicas: int, seconds: float) -> Trial:
     task = Task((legged_robot(draft.load("quadruped").resolve("cheetah")),), stage)
     return Trial(task, found, replicas, seconds=seconds, settle=seconds / 6)
 
