@@ -19,7 +19,7 @@ BUDGET = {
     "cli": 5_250,
     "description": 2_200,
     "design": 5_280,
-    "explore": 2_350,
+    "explore": 2_360,
     "fitting": 4_150,
     "imports": 6_250,
     "laws": 1_850,

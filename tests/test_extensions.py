@@ -142,6 +142,26 @@ def test_an_entry_point_to_no_module_is_told(install: Install) -> None:
         assert left() == []
 
 
+def test_an_entry_point_that_names_no_module_is_told(install: Install) -> None:
+    install("ext_dash", "", "ext-dash")
+    with pytest.warns(ExtensionWarning, match=r"extension '\w+' of .* is not used"):
+        assert "mass" in METRICS
+
+
+def test_a_metric_that_fails_is_left_out_of_a_run_that_names_none(
+    install: Install, tmp_path: Path
+) -> None:
+    pytest.importorskip("pyarrow")
+    install("ext_fails", METRIC.format(name="fails", body="raise KeyError('x')"))
+    vary = {"thigh_length": (0.2, 0.25)}
+    with pytest.warns(ExtensionWarning, match="the metric 'fails' of ext_fails fails: KeyError"):
+        rows = draft.sweep("hopper", vary=vary, n=2, out=tmp_path / "all")
+    assert rows.accepted == 2
+    with pytest.raises(draft.DraftError, match="the metric 'fails' of ext_fails fails"):
+        draft.sweep("hopper", vary=vary, n=2, metrics=["fails"], out=tmp_path / "named")
+    assert not (tmp_path / "named").exists()
+
+
 def test_of_two_extensions_with_one_name_the_second_is_left_out(install: Install) -> None:
     install("ext_a", METRIC.format(name="same", body="return 1.0"))
     install("ext_b", METRIC.format(name="own", body="1") + METRIC.format(name="same", body="2"))

@@ -50,7 +50,7 @@ class Extension:
 class Registry(Mapping[str, T], Generic[T]):
     """Named items of one kind: those of Draft, of installed extensions and of a script.
 
-    Reading it loads the installed extensions; adding to it does not.
+    Reading it loads the installed extensions.
     """
 
     def __init__(self, kind: str) -> None:
@@ -139,7 +139,7 @@ class Registry(Mapping[str, T], Generic[T]):
     def __contains__(self, name: object) -> bool:
         """Return whether there is an item of a name."""
         load()
-        return name in self._items
+        return isinstance(name, str) and name in self._items
 
 
 _REGISTRIES: list[Registry[Any]] = []
@@ -212,12 +212,13 @@ def _entries() -> list[EntryPoint]:
 def _loaded(entry: EntryPoint) -> Extension:
     """Import the module of an extension, or undo what it registered and say why."""
     package, version = (entry.dist.name, entry.dist.version) if entry.dist else ("", "")
+    module = entry.value.partition(":")[0].strip()
     modules, items = {*sys.modules}, {id(one): {*one._items} for one in _REGISTRIES}
     try:
         entry.load()
     # Whatever an extension raises is its author's fault, and must not end Draft.
     except (Exception, SystemExit) as error:
-        root = _root(entry.module)
+        root = _root(module)
         # Its import may have made registries, whose items of Draft stay.
         for registry in _REGISTRIES:
             registry.drop(root, items.get(id(registry), ()))
@@ -225,8 +226,8 @@ def _loaded(entry: EntryPoint) -> Extension:
         for name in {*sys.modules} - modules:
             if _root(name) == root:
                 del sys.modules[name]
-        return Extension(entry.name, entry.value, package, version, reason(error))
-    return Extension(entry.name, entry.value, package, version)
+        return Extension(entry.name, module, package, version, reason(error))
+    return Extension(entry.name, module, package, version)
 
 
 def _root(module: str) -> str:

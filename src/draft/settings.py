@@ -241,5 +241,7 @@ def _text(value: object) -> str:
 
 def _plain(value: Any) -> Any:
     """Numbers and arrays of NumPy as plain ones, and lists as tuples."""
+    if isinstance(value, Mapping):
+        return {name: _plain(one) if hasattr(one, "tolist") else one for name, one in value.items()}
     value = value.tolist() if hasattr(value, "tolist") else value
     return tuple(map(_plain, value)) if isinstance(value, list | tuple) else value

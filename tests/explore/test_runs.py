@@ -99,6 +99,8 @@ def test_ranges_by_name_are_those_of_the_command() -> None:
         "1:2",
         [True],
         [[1], [2]],
+        [[1], [1, 2]],
+        (1, 10**400),
         {1: 2},
         ("a", "b"),
         (0.2, float("nan")),

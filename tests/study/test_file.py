@@ -165,6 +165,7 @@ def test_a_family_is_read() -> None:
         (TEXT.replace("[base, push]", "[base, push, terrain]"), "out of order; the order is base,"),
         (TEXT.replace("[base, push]", "[base, base]"), "base is listed twice"),
         (TEXT.replace("[base, push]", "[base, jump]"), "small.yaml:3:16: stages[1]: unknown value"),
+        (TEXT.replace("[base, push]", "[[base], push]"), "small.yaml:3:10: stages[0]: expected"),
         (TEXT.replace("[base, push]", "[base]"), "small.yaml:4:23: stage 'push' is not trained"),
         (TEXT.replace("base: 3", "base: 0"), "small.yaml:4:20: iterations.base: expected a whole"),
         (TEXT.replace("base: 3", "bse: 3"), "small.yaml:4:14: iterations.bse: unknown value 'bse'"),

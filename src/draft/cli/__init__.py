@@ -91,7 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         print(f"draft {own_version()}")
         return ACCEPTED
-    warnings.formatwarning = _warning
+    before, warnings.formatwarning = warnings.formatwarning, _warning
     try:
         _check_current_folder()
         return _run(args)
@@ -117,6 +117,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             cause = f"MuJoCo cannot load the renderer of MUJOCO_GL={renderer}"
             return _fail(f"{cause}\n  {_RENDERERS}")
         return _fault(error)
+    finally:
+        warnings.formatwarning = before
 
 
 def _check_current_folder() -> None:

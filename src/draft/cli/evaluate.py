@@ -71,7 +71,7 @@ def main(
     check_folder(None if options.out is None else str(options.out))
     if not runs:
         raise DraftError("no run is named", "name a folder of 'draft train'")
-    spelt = {
+    asked = {
         "errors": _error_source(perturbed, options.errors),
         "protocol": "published" if published else "walking",
     }
@@ -81,7 +81,7 @@ def main(
     skill_tests(options.test or ("speed",), options.levels)  # Check before any run is read.
     opened = _open(runs, options)
     evaluations = [
-        evaluation.prepare(run, options.model_copy(update=spelt | {"test": names}))
+        evaluation.prepare(run, options.model_copy(update=asked | {"test": names}))
         for run, names in zip(opened, _tests(opened, options.test, force), strict=True)
     ]
     return _all(evaluations, options)

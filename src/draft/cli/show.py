@@ -123,7 +123,7 @@ def _actuator(actuator: Actuator) -> Table:
             quantity.table_unit,
             source,
             str(trend.n) if trend else "",
-            f"{trend.held_out['vendor']:.2f} x" if trend else "",
+            f"{trend.held_out['vendor']:.2f} x" if trend and trend.held_out else "",
             " .. ".join(f"{x * factor:.3g}" for x in bands[key]) if key in bands else "",
         )
     return table

@@ -129,6 +129,8 @@ def extended(design: Design) -> Iterator[Finding]:
             for finding in found:
                 if finding.id != name:
                     raise ValueError(f"it yields a finding of the kind '{finding.id}'")
+                if (finding.severity == "error") != one.error:
+                    raise ValueError(f"it yields a finding of severity '{finding.severity}'")
                 if np.shape(finding.mask) not in ((), (design.count,)):
                     raise ValueError(f"it yields a mask of shape {np.shape(finding.mask)}")
         except Exception as error:

@@ -114,7 +114,7 @@ def trend_record(trend: Law) -> dict[str, Any]:
         "n": trend.n,
         "r_squared": trend.r_squared,
         "held_out_error": trend.held_out.get("row"),
-        "held_out_vendor_error": trend.held_out["vendor"],
+        "held_out_vendor_error": trend.held_out.get("vendor"),
         "source": trend.source,
     }
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -19,11 +20,11 @@ from draft import metrics as m
 from draft.design import Design
 from draft.design.checks import CHECKS
 from draft.design.references import find_design
-from draft.errors import DraftError, counted
+from draft.errors import DraftError, ModelError, RefusedError, counted
 from draft.explore import where
 from draft.explore.settings import LearnedMetrics, Number, Sampled
 from draft.explore.where import Condition
-from draft.extensions import load
+from draft.extensions import ExtensionWarning, load
 from draft.extras import own_version
 from draft.laws import actuators, catalogue, structure
 from draft.metrics.learned import digest
@@ -176,9 +177,33 @@ def make(
     # Resolve one design, so that errors in the values are reported before anything is written.
     if count <= MAX_ROWS:
         design = spec.resolve(fixed, job.draw(0, 1))
+        job = _tried(job, design[0], named=settings.metrics is not None)
         if job.policy:
             job = replace(job, digest=digest(job.policy, design[0]))
     return job
+
+
+def _tried(job: Job, design: Design, named: bool) -> Job:
+    """Job without the metrics of extensions that fail for a design, with a warning for each.
+
+    Raises:
+        DraftError: one of them fails that is named.
+    """
+    failing: set[str] = set()
+    for name in filter(m.METRICS.origin, job.read):
+        try:
+            if m.find(name).needs == "design":
+                m.of_design(design, [name])
+            else:
+                m.of_model(design.build(), [name])
+        except (RefusedError, ModelError):
+            continue  # The design has no model; others may.
+        except DraftError as error:
+            if named or name not in job.metrics:
+                raise
+            warnings.warn(error.problems[0].cause, ExtensionWarning, stacklevel=2)
+            failing.add(name)
+    return replace(job, metrics=tuple(name for name in job.metrics if name not in failing))
 
 
 def _base(robot: Robot, settings: Sampled) -> tuple[Spec, dict[str, Number]]:

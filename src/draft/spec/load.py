@@ -53,11 +53,11 @@ def robots(folder: str | Path, origin: str) -> None:
     Raises:
         DraftError: it holds no robot, or a robot of this name exists already.
     """
-    found = sorted(path.parent.resolve() for path in Path(folder).glob("*/parameters.yaml"))
+    found = sorted(path.parent for path in Path(folder).glob("*/parameters.yaml"))
     if not found:
         raise DraftError(f"there is no robot in '{folder}', of {origin}", MISSING)
     for path in found:
-        FOLDERS.add(path.name, path, origin)
+        FOLDERS.add(path.name, path.resolve(), origin)
 
 
 robots(ROBOTS, "draft.robots")

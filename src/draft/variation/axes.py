@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from sys import float_info
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +72,8 @@ def ranges(vary: Vary) -> Mapping[str, Range]:
         DraftError: `vary` is neither, a word has another form, or a name is given twice.
     """
     if isinstance(vary, Mapping):
+        if odd := [name for name in vary if not isinstance(name, str)]:
+            raise DraftError(f"`vary` has the key {odd[0]!r}", "give names of numbers as text")
         return vary
     given = [vary] if isinstance(vary, str) else vary
     if not (isinstance(given, Sequence) and all(isinstance(word, str) for word in given)):
@@ -136,7 +138,7 @@ def _of_numbers(name: str, given: object) -> Axis:
             return Axis(name, float(low), float(high))
         case tuple((low, high, "log")) if _real(low, high):
             return Axis(name, float(low), float(high), log=True)
-        case list() | np.ndarray() if np.ndim(given) == 1 and np.size(given) and _real(*given):
+        case list() | np.ndarray(ndim=1) if len(given) and _real(*given):
             values = tuple(float(value) for value in given)
             return Axis(name, min(values), max(values), values=values)
     cause = f"vary['{name}'] is {given!r}, neither a range nor a list of values"
@@ -147,7 +149,7 @@ def _of_numbers(name: str, given: object) -> Axis:
 def _real(*numbers: object) -> bool:
     kinds = (int, float, np.integer, np.floating)
     return all(
-        isinstance(one, kinds) and not isinstance(one, bool) and math.isfinite(one)
+        isinstance(one, kinds) and not isinstance(one, bool) and abs(one) <= float_info.max
         for one in numbers
     )
 

@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from draft.errors import DraftError
 from draft.learn.task import terms
 from draft.learn.task.config import STAGES, Config, from_dict
 from draft.learn.task.constants import Scaled
+from draft.learn.task.groups import Rewards
 from draft.learn.task.recipes import LAPTOP
 from draft.learn.task.stages import is_like
 from draft.learn.task.terms import TERMS, event, number, reward, stage, termination
@@ -112,6 +113,44 @@ def test_parameters_without_numbers_and_numbers_without_a_unit_are_refused() -> 
 
     assert "leap" not in STAGES
     assert not TERMS
+
+
+def test_numbers_out_of_range_or_with_names_of_draft_are_refused() -> None:
+    def gated(env: Any, gate: float) -> None: ...
+
+    def weighed(env: Any, weight: float) -> None: ...
+
+    def short(cfg: Any, task: Any) -> None: ...
+
+    with pytest.raises(DraftError, match=r"gate must be at least 0\n  it is -1.0"):
+        reward(weight=1.0, gate=number(-1.0, "m/s", "a gate", least=0.0))(gated)
+    with pytest.raises(DraftError, match="has a number 'weight', a name of Draft's own"):
+        termination(weight=number(1.0, "1", "a weight"))(weighed)
+    with pytest.raises(DraftError, match="iterations must be"):
+        stage(iterations=0)(short)
+
+
+def test_an_event_has_a_known_mode() -> None:
+    with pytest.raises(DraftError, match=r"no mode 'intervall'\n  did you mean 'interval'"):
+        event("intervall")  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+def test_names_of_drafts_own_terms_are_refused() -> None:
+    pytest.importorskip("mjlab")
+    from draft.learn.task.mdp.environment import environment
+    from draft.learn.task.world.task import Task
+
+    members, found = plan().members, {"reward": set(), "termination": set(), "event": set()}
+    for name in ("base", "velocity", "terrain", "push"):
+        for ground in ("flat", "uneven"):
+            cfg = environment(Task(members, name, ground=ground), 1)
+            for kind, names in found.items():
+                names |= {*getattr(cfg, f"{kind}s")}
+    weights = {field.name[:-7] for field in fields(Rewards) if field.name.endswith("_weight")}
+    assert found["reward"] <= weights | {*terms.RESERVED["reward"]}
+    for kind in ("termination", "event"):
+        assert found[kind] <= {*terms.RESERVED[kind]}
 
 
 def test_a_stage_is_like_another_and_has_its_own_numbers() -> None:
@@ -307,12 +346,11 @@ def test_an_environment_has_the_terms_of_its_configuration(site: Path, still: st
     from draft.learn.task.mdp.environment import environment
     from draft.learn.training.ppo.trainer import task_of
 
-    @termination()
     def tilted(env: Any) -> Any: ...
 
-    task = task_of(plan())
     with pytest.raises(DraftError, match="there is a termination 'tilted' already"):
-        environment(task, 1)
+        termination()(tilted)
+    task = task_of(plan())
     config = task.config
     task = replace(task, config=replace(config, terms=config.terms[:1]))
     term = environment(task, 1).rewards["still"]

@@ -85,7 +85,7 @@ def run_processes(
             raise _error(server, Problem(cause, None, f"see their logs in {logs}")) from None
         except (RuntimeError, OSError) as error:
             cause = f"torchrunx cannot run {count} processes: {error}"
-            remedy = "use one process: `device=0`, or `replicas=1` on a CPU"
+            remedy = 'use one process: `device="0"`, or `replicas=1` on a CPU'
             raise _error(server, Problem(cause, None, remedy)) from None
         if server.error is not None:
             raise server.error

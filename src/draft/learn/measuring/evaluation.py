@@ -182,7 +182,7 @@ def opened(run: Run | Design | Spec | str | Path, policy: str | Path | None = No
 
 def prepare(run: Run | Design | Spec | str | Path, options: Options) -> Evaluation:
     """Check the options of an evaluation, and find the folder of its result; see `evaluate`."""
-    run = run if isinstance(run, Run) else opened(run, options.policy)
+    run = run if isinstance(run, Guest) else opened(run, options.policy)
     names = usual(run) if options.test is None else options.test
     chosen = skill_tests(names, options.levels)
     request = make_request(run, chosen, options)

@@ -128,7 +128,7 @@ class Config:
                 if row.name not in [f"learning.iterations_{other}" for other in omitted]
             ]
             for name, group in self.groups().items()
-            if name not in omitted
+            if stage is None or name not in omitted or is_like(stage, name)
         }
 
 

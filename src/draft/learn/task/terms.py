@@ -12,9 +12,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, make_dataclass
 from functools import wraps
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, get_args
 
-from draft.errors import DraftError
+import numpy as np
+
+from draft.errors import DraftError, suggest
 from draft.extensions import Registry
 from draft.learn.task.constants import ANY, POSITIVE, Scaled, Within, choice
 from draft.learn.task.groups import Rewards
@@ -28,6 +30,18 @@ if TYPE_CHECKING:
 Kind = Literal["reward", "termination", "event", "stage"]
 Mode = Literal["startup", "reset", "interval", "step"]
 F = TypeVar("F", bound=Callable[..., Any])
+# Names of Draft's own terms, which stages change by their names; rewards with a `NAME_weight` too.
+RESERVED: Mapping[str, tuple[str, ...]] = {
+    "reward": (
+        *("linear_velocity", "angular_velocity", "vertical_velocity", "joint_limits"),
+        *("upper_legs", "speed", "progress"),
+    ),
+    "termination": ("tilted", "low", "time_out", "left_ground"),
+    "event": (
+        *("reset_base", "reset_joints", "foot_friction", "encoder_bias", "shift_centre"),
+        *("push", "designs", "inertia_errors"),
+    ),
+}
 _LEADING = {"event": ("env", "env_ids"), "stage": ("cfg", "task")}
 
 
@@ -142,6 +156,8 @@ def event(mode: Mode = "step", **numbers: Any) -> Callable[[F], F]:
     Raises:
         DraftError: the name is taken, or parameters and numbers differ.
     """
+    if mode not in get_args(Mode):
+        raise DraftError(f"an event has no mode '{mode}'", suggest(mode, get_args(Mode), "modes"))
     own = {"interval": numbers.pop("interval", None)} if mode == "interval" else {}
     if own and not isinstance(own["interval"], Number):
         cause = "an event of mode 'interval' has no number 'interval'"
@@ -193,11 +209,17 @@ def _registration(
             wanted = ", ".join((*leading, *numbers))
             cause = f"{module}: {kind} '{name}' takes ({', '.join(takes)}), not ({wanted})"
             raise DraftError(cause, "give each parameter its number, by its name")
+        if used := {"weight", "interval", "iterations"} & {*numbers}:
+            cause = f"{module}: {kind} '{name}' has a number '{min(used)}', a name of Draft's own"
+            raise DraftError(cause, "rename the number and its parameter")
         brought = []
         for key, one in {**own, **numbers}.items():
             if not isinstance(one, Number):
                 cause = f"{module}: {kind} '{name}' has no unit and meaning for '{key}'"
                 raise DraftError(cause, f'{key}=number({one!r}, "m/s", "what it is")')
+            if not one.within.holds(np.ravel(one.value).tolist()):
+                cause = f"{module}: {kind} '{name}': {key} must be {one.within.words}"
+                raise DraftError(cause, f"it is {one.value!r}")
             value = choice(one.value, one.unit, one.doc, module, one.power, one.within)
             brought.append((key, type(one.value), value))
         about = {"__doc__": inspect.getdoc(function) or kind}
@@ -219,6 +241,7 @@ def _check_name(kind: Kind, name: str, module: str) -> None:
     taken = {one.name: "group of numbers" for one in fields(Config)}
     taken |= dict.fromkeys(STAGES, "stage")
     taken |= {one.name[:-7]: "reward" for one in fields(Rewards) if one.name.endswith("_weight")}
+    taken |= dict.fromkeys(RESERVED.get(kind, ()), kind)
     taken |= {other: term.kind for other, term in TERMS.items()}
     if name in taken:
         cause = f"{module}: there is a {taken[name]} '{name}' already"

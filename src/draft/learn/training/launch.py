@@ -76,10 +76,12 @@ def _modules(run: Run) -> tuple[str, ...]:
     Raises:
         DraftError: a term is of the script that runs, which no process can import.
     """
-    found = {TERMS[name].function.__module__: name for name, _ in run.plan.config.terms}
+    terms = run.plan.config.of_stage(run.plan.stage).terms
+    found = {TERMS[name].function.__module__: name for name, _ in terms}
     if "__main__" in found:
         cause = f"several processes cannot import '{found['__main__']}' from the script that runs"
-        raise DraftError(cause, "move it to a module, or pass `replicas=1`")
+        remedy = 'move it to a module, or use one process: `replicas=1`, or one GPU: `device="0"`'
+        raise DraftError(cause, remedy)
     return tuple(found)
 
 

@@ -69,7 +69,8 @@ def _fault(link: type[LinkBase]) -> str:
         return ""
     if not issubclass(end, End) or end.key not in link.model_fields.keys() - LinkBase.model_fields:
         return "has an 'end' that is no End with the 'key' of one of its fields"
-    ends = (one.end for one in LINKS.present.values())
+    # A cell of a notebook that runs again replaces its own link.
+    ends = (one.end for name, one in LINKS.present.items() if name != link.type_name())
     others = [one for one in ends if one is not None and one is not end]
     if end.key in {one.key for one in others}:
         return f"has the key '{end.key}' of another one"

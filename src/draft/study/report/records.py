@@ -12,7 +12,7 @@ import numpy as np
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.measuring.summary import ARMS, PROTOCOLS, Arm, Protocol, Summary
 from draft.learn.measuring.utilisation import BINS, CELLS
-from draft.learn.task.config import STAGES
+from draft.learn.task.stages import STAGES
 from draft.learn.training.members import robots_digest
 from draft.learn.training.progress import Row
 from draft.values import Array

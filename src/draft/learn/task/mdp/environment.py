@@ -20,7 +20,6 @@ from mjlab.tasks.velocity import mdp as velocity_mdp
 from mjlab.terrains import TerrainEntityCfg
 from mjlab.viewer import ViewerConfig
 
-from draft.errors import DraftError
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
 from draft.learn.task.mdp import terminations
@@ -164,19 +163,12 @@ def _sensors(task: Task, terrain: TerrainEntityCfg) -> tuple[SensorCfg, ...]:
 
 
 def _add_terms(cfg: ManagerBasedRlEnvCfg, config: Config) -> None:
-    """Add the terms of extensions.
-
-    Raises:
-        DraftError: Draft has a term of this name.
-    """
+    """Add the terms of extensions."""
     for name, numbers in config.terms:
         term, params = TERMS[name], arguments(numbers)
         if term.kind == "stage":
             continue
         terms: dict[str, Any] = getattr(cfg, f"{term.kind}s")
-        if name in terms:
-            cause = f"{term.function.__module__}: there is a {term.kind} '{name}' already"
-            raise DraftError(cause, f"rename the {term.kind}")
         options = {**term.options, "func": guarded(name, term.function), "params": params}
         if term.kind == "reward":
             terms[name] = RewardTermCfg(weight=numbers.weight, **options)
