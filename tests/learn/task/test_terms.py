@@ -20,7 +20,7 @@ from draft.learn.task.groups import Rewards
 from draft.learn.task.recipes import LAPTOP
 from draft.learn.task.stages import is_like
 from draft.learn.task.terms import TERMS, event, number, reward, stage, termination
-from draft.learn.training.run import create, open_run
+from draft.learn.training.run import check_same, create, open_run
 from tests.learn.small import plan
 
 GATE = number(0.1, "m/s", "largest command that counts as standing", power=0.5, least=0.0)
@@ -178,6 +178,16 @@ def test_a_run_whose_term_is_missing_is_refused_in_one_line(still: str, tmp_path
     with pytest.raises(DraftError, match=words) as caught:
         open_run(run.folder)
     assert "install the package" in str(caught.value)
+
+
+def test_a_term_that_was_added_since_a_run_began_is_named(tmp_path: Path) -> None:
+    run = create(tmp_path / "run", plan(), {"quadruped:cheetah": "values: {}\n"})
+
+    @reward(weight=-0.5)
+    def later(env: Any) -> Any: ...
+
+    with pytest.raises(DraftError, match=r"later.weight differ\n  the terms of tests\.learn"):
+        check_same(run, plan())
 
 
 # --- an installed package ------------------------------------------------------------------

@@ -408,6 +408,10 @@ def check_same(run: Run, plan: Plan) -> None:
         names = ", ".join(name.replace("_", " ") for name in differing[:6])
         cause = f"'{run.folder}' holds a run with another plan: {names} differ"
         remedy = "choose another `out`, or repeat the command that created it"
+        groups = {name.partition(".")[0] for name in differing} - {*run.plan.record()["config"]}
+        if modules := sorted({TERMS.origin(group) for group in groups if group in TERMS}):
+            remedy = f"the terms of {', '.join(modules)} were added since: name the folder alone "
+            remedy += "to resume without them"
         raise DraftError(cause, remedy)
 
 
