@@ -217,8 +217,10 @@ def _type_as_written(kind: type[Settings], field: str) -> str:
 def _documented(text: str, name: str, kind: type[Settings]) -> str:
     """Docstring with an entry for each field in the place of that of the settings."""
     lines = []
-    for line in text.splitlines():
-        if not line.startswith(f"        {name}: "):
+    for line in inspect.cleandoc(
+        text
+    ).splitlines():  # Python 3.13 strips the indent, others do not.
+        if not line.startswith(f"    {name}: "):
             lines.append(line)
             continue
         for field, about in kind.model_fields.items():
@@ -229,7 +231,7 @@ def _documented(text: str, name: str, kind: type[Settings]) -> str:
                 words += f"; one of {', '.join(map(str, values))}"
             words += f"; by default {default}." if (default := shown(about).default) else "."
             entry = textwrap.fill(f"{field}: {words}", 88, subsequent_indent="    ")
-            lines.append(textwrap.indent(entry, " " * 8))
+            lines.append(textwrap.indent(entry, " " * 4))
     return "\n".join(lines)
 
 

@@ -32,7 +32,7 @@ told["help"] = " ".join(out.getvalue().split())
 told["completed"] = "--slope" in {one.command: one for one in entries()}["evaluate"].options
 parameter = inspect.signature(draft.evaluate).parameters["slope"]
 told["signature"] = [parameter.annotation, parameter.default]
-told["doc"] = draft.evaluate.__doc__
+told["doc"] = inspect.getdoc(draft.evaluate)
 try:
     draft.evaluate("quadruped", slope=31.0)
 except DraftError as error:
@@ -61,7 +61,7 @@ def test_an_option_is_added_by_its_field(tmp_path: Path) -> None:
     assert "--slope ANGLE Slope of the ground [deg]. (default: flat)" in told["help"]
     assert told["completed"]
     assert told["signature"] == ["float", 0.0]
-    assert "\n        slope: slope of the ground [deg]; by default flat.\n" in told["doc"]
+    assert "\n    slope: slope of the ground [deg]; by default flat.\n" in told["doc"]
     assert told["refused"] == "`slope` 31 is not a number from 0 to 30 deg\n  omit it for flat"
     # The result, and the jobs of a study and their workers; keys of jobs are as they were.
     assert (told["folder"], told["asked"]) == ("evaluation-slope-5deg", 5.0)

@@ -38,7 +38,7 @@ with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()) 
 told["help"] = " ".join(out.getvalue().split())
 told["completed"] = {one.command: one for one in entries()}["train"].options
 told["signature"] = [*inspect.signature(draft.train).parameters]
-told["doc"] = draft.train.__doc__
+told["doc"] = inspect.getdoc(draft.train)
 told["file"] = study(TEXT + "rocks: 3\\n").trainings.rocks
 request = to_dict(jobs()["bear-base-0"].request(Path(sys.argv[1]), "cpu", None))
 told["worker"] = from_dict(request | {"echo": 5.0}).echo
@@ -63,7 +63,7 @@ def test_an_option_of_a_training_is_added_by_its_field(tmp_path: Path) -> None:
     assert "--echo S Time between two lines of progress [s]. (default: none)" in told["help"]
     assert {"--rocks", "--echo"} <= {*told["completed"]}
     assert {"rocks", "echo"} <= {*told["signature"]}
-    assert "\n        rocks: number of rocks on the ground; by default none.\n" in told["doc"]
+    assert "\n    rocks: number of rocks on the ground; by default none.\n" in told["doc"]
     # The file of a study, and a job of its workers.
     assert (told["file"], told["worker"]) == (3, 5.0)
     in_file, in_python, on_the_command_line = told["errors"]

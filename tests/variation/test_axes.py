@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 import draft
 from draft.variation import axes, sampling
 
+pytest.importorskip("scipy")  # Sobol samples are scipy's.
+
 SPEC = draft.load("quadruped")
 TWO = axes.parse(SPEC, ["thigh_length=0.2:0.7", "actuators.leg.peak_torque=40:500:log"])
 LISTED = axes.parse(SPEC, ["thigh_length=0.2:0.7", "shank_length=0.2,0.3,0.5"])

@@ -276,7 +276,7 @@ def test_worlds_that_do_not_fit_into_memory_are_refused_with_a_number_that_fits(
         try:
             check_memory(worlds, 24, 494, processes)
         except DraftError as error:
-            most = re.search(r"add --envs (\d+) or fewer", str(error))
+            most = re.search(r"add `envs=(\d+)` or fewer", str(error))
             assert most is not None
             assert int(most[1]) < worlds
             check_memory(int(most[1]), 24, 494, processes)
