@@ -35,7 +35,7 @@ from draft.model.scene import DAMPING, STIFFNESS
 from draft.model.texts import Text
 from tests.learn.alone import compiled
 
-STEPS, WORLDS, DROP = 20, 8, 0.002
+STEPS, WORLDS, DROP = 40, 8, 0.002
 # Nothing is drawn: what is left of the randomisation has no width.
 CALM = Config().with_values(
     {
