@@ -354,6 +354,18 @@ def test_the_learning_rate_follows_the_divergence(kl: float, factor: float) -> N
     assert alg.learning_rate == pytest.approx(1e-3 * factor)
 
 
+def test_the_learning_rate_and_the_entropy_fall_to_a_twentieth() -> None:
+    alg = algorithm(Ppo, least_rate=2e-4)
+    for share, most in ((0.0, 1e-2), (0.5, 1e-3 * 0.05**0.5), (1.0, 5e-5)):
+        alg.decay(share)
+        for _ in range(20):
+            alg._adapt(0.001)
+        assert alg.learning_rate == pytest.approx(most)
+        for _ in range(20):
+            alg._adapt(1.0)
+        assert alg.learning_rate == pytest.approx(min(most, 2e-4))
+
+
 # Checkpoints.
 
 

@@ -12,6 +12,7 @@ from draft.errors import DraftError
 from draft.extras import need
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import Engine, choose, cores, devices
+from draft.learn.measuring.conditions import with_conditions
 from draft.learn.measuring.evaluation_options import Options, Report
 from draft.learn.measuring.levels import SkillTest, of_stage, skill_tests
 from draft.learn.measuring.policies import Source, open_source
@@ -186,6 +187,7 @@ def prepare(run: Run | Design | Spec | str | Path, options: Options) -> Evaluati
     names = usual(run) if options.test is None else options.test
     chosen = skill_tests(names, options.levels)
     request = make_request(run, chosen, options)
+    with_conditions(run.plan.config, request)  # Refused before anything is loaded.
     out = None if options.out is None else Path(options.out)
     return Evaluation(run, chosen, request, result_folder(run, request, out))
 

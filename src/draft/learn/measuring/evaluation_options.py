@@ -36,6 +36,22 @@ class Extras(BaseModel):
     """Mass of a block on the trunk, 500 kg/m3; the policy was trained without it [kg]."""
     regeneration: Annotated[float, Field(ge=0, le=1), Shown("SHARE", "none")] = 0.0
     """Share of the power of braking joints that returns to the battery, 0 to 1."""
+    timestep: Annotated[
+        float | None, Field(gt=0, le=0.02), Shown("S", "that of the training", unit="s")
+    ] = None
+    """Physics step [s], a part of the control period."""
+    friction: Annotated[
+        float | None, Field(gt=0, le=10), Shown("N", "drawn as in the training")
+    ] = None
+    """Friction of the feet."""
+    contact_time: Annotated[
+        float | None, Field(gt=0, le=0.2), Shown("S", "that of the training", unit="s")
+    ] = None
+    """Time constant of the contacts of the feet [s]; at least two physics steps act."""
+    delay: Annotated[
+        float | None, Field(ge=0, le=0.1), Shown("S", "that of the training", unit="s")
+    ] = None
+    """Delay of the joint targets [s], at most a control period."""
 
 
 class RollOuts(Settings):

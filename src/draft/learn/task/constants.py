@@ -56,6 +56,9 @@ SHARE = Within("a share, 0 to 1", lambda values: min(values) >= 0 and max(values
 RANGE = Within(
     "a range from 0 or more, the smaller number first", lambda values: 0 <= values[0] <= values[-1]
 )
+POSITIVE_RANGE = Within(
+    "a range above 0, the smaller number first", lambda values: 0 < values[0] <= values[-1]
+)
 
 
 def paper(value: T, unit: str, doc: str, power: float = 0.0, within: Within = LEAST_ZERO) -> T:

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from draft.learn.task.constants import ANY, POSITIVE, RANGE, SHARE, choice, paper
+from draft.learn.task.constants import ANY, POSITIVE, POSITIVE_RANGE, RANGE, SHARE, choice, paper
 from draft.model.scene import DAMPING, STIFFNESS
 
+CONTACT_TIME = 0.02  # MuJoCo's default time constant of contacts [s].
 CODE, MJLAB, DRAFT = "released code", "mjlab", "Draft"
 Range = tuple[float, float]
 Ramp = tuple[tuple[int, float], ...]
@@ -158,6 +159,26 @@ class Episodes:
     drop: Range = choice((0.01, 0.05), "m", "height of the feet at the start", MJLAB, within=RANGE)
     yaw: float = choice(3.14, "rad", "largest |yaw| at the start", MJLAB)
     friction: Range = choice((0.4, 1.1), "1", "friction of all feet of a world", CODE, within=RANGE)
+    contact_time: Range = choice(
+        (CONTACT_TIME, CONTACT_TIME),
+        "s",
+        "time constant of the contacts of all feet of a world; at least two physics steps",
+        DRAFT,
+        within=POSITIVE_RANGE,
+    )
+    delay: Range = choice(
+        (0.0, 0.0), "s", "delay of the joint targets, at most a control period", DRAFT, within=RANGE
+    )
+    motor: Range = choice(
+        (1.0, 1.0), "1", "factor on the torque of each motor", DRAFT, within=POSITIVE_RANGE
+    )
+    joint_friction: Range = choice(
+        (0.0, 0.0),
+        "1",
+        "viscous friction of each joint at its no-load speed, per peak torque",
+        DRAFT,
+        within=RANGE,
+    )
     centre: float = choice(
         0.02, "m", "largest shift of the trunk's centre of mass per axis", CODE, 1.0
     )
@@ -383,6 +404,14 @@ class Learning:
     kl: float = choice(0.01, "1", "target of the KL divergence", CODE, within=POSITIVE)
     gradient: float = choice(1.0, "1", "largest norm of a gradient", CODE, within=POSITIVE)
     least_rate: float = choice(1e-5, "1", "floor of the learning rate", "rsl-rl")
+    decay: float = choice(
+        0.0,
+        "1",
+        "last share of the iterations, in which the learning rate and the weight of the entropy "
+        "fall to a twentieth",
+        DRAFT,
+        within=SHARE,
+    )
     mirror: bool = choice(
         False, "1", "networks are kept symmetric under the left-right mirror image", DRAFT
     )

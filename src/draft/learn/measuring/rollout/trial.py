@@ -13,6 +13,7 @@ import numpy as np
 from mjlab.managers.event_manager import EventTermCfg
 
 from draft.learn.bodies.payload import with_payload
+from draft.learn.measuring.conditions import with_conditions
 from draft.learn.measuring.levels import (
     FORWARD_LEAST,
     REPLICAS,
@@ -117,13 +118,18 @@ def trial(run: Run, tests: Sequence[SkillTest], request: Request) -> Trial:
         request: everything that determines the result.
 
     Raises:
-        DraftError: inertia errors are requested, and cannot be drawn for its designs.
+        DraftError: inertia errors are requested, and cannot be drawn for its designs; or the
+            physics that is asked for is impossible, see `with_conditions`.
     """
     extra: Mapping[str, EventTermCfg] = {}
     if request.errors is not None:
         extra = inertia_errors(run.plan.members, request.errors)
     return Trial(
-        task=replace(task_of(run.plan), members=with_payload(run.plan.members, request.payload)),
+        task=replace(
+            task_of(run.plan),
+            members=with_payload(run.plan.members, request.payload),
+            config=with_conditions(run.plan.config, request),
+        ),
         tests=tuple(tests),
         replicas=request.replicas,
         published=request.protocol == "published",

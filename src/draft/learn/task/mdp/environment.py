@@ -23,6 +23,7 @@ from mjlab.viewer import ViewerConfig
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
 from draft.learn.task.mdp import terminations
+from draft.learn.task.mdp.actions import DelayedTargetsCfg
 from draft.learn.task.mdp.commands import command_cfg
 from draft.learn.task.mdp.events import event_cfgs
 from draft.learn.task.mdp.observations import observation_cfgs
@@ -70,14 +71,7 @@ def environment(
             extent=2.0,
         ),
         observations=observation_cfgs(task, play),
-        actions={
-            "joint_pos": JointPositionActionCfg(
-                entity_name="robot",
-                actuator_names=(".*",),
-                scale=config.actuation.action_scale,
-                use_default_offset=True,
-            )
-        },
+        actions={"joint_pos": _targets(config)},
         commands={COMMAND: command_cfg(task)},
         events=event_cfgs(task),
         rewards=reward_cfgs(task),
@@ -111,6 +105,20 @@ def environment(
         cfg.events = {name: term for name, term in cfg.events.items() if name in WATCHED}
         cfg.terminations = {name: cfg.terminations[name] for name in FALLS}
     return cfg
+
+
+def _targets(config: Config) -> JointPositionActionCfg:
+    """Configuration of the action: targets of all joints."""
+    targets = {
+        "entity_name": "robot",
+        "actuator_names": (".*",),
+        "scale": config.actuation.action_scale,
+        "use_default_offset": True,
+    }
+    delay = config.episodes.delay
+    if any(delay):
+        return DelayedTargetsCfg(**targets, delay=delay)
+    return JointPositionActionCfg(**targets)
 
 
 def _terrain(task: Task) -> TerrainEntityCfg:

@@ -19,6 +19,7 @@ from draft.learn.task.config import Config
 from draft.learn.task.constants import Scaled, ramp_at, scaled
 from draft.learn.task.groups import Episodes, Pushing, Ramp
 from draft.learn.task.mdp.commands import share_of_worlds
+from draft.learn.task.mdp.physics_errors import physics_errors
 from draft.learn.task.mdp.world_models import assume_designs
 from draft.learn.task.world.access import iteration, robot_of
 from draft.learn.task.world.robot import Robot
@@ -270,6 +271,7 @@ def event_cfgs(task: Task) -> dict[str, EventTermCfg]:
         "shift_centre": EventTermCfg(
             func=shift_centre, mode="startup", params={"reach": scaled(e, "centre")}
         ),
+        **physics_errors(e),
         "push": EventTermCfg(func=Pushes, mode="step", params={**_pushes(task)}),
     }
 

@@ -84,6 +84,7 @@ class Robot(Entity):
         for name, values in _numbers(members, device).items():
             setattr(self, name, values[self.member])
         self.redrawn = False
+        self._motors = torch.ones_like(self.peak_torque)
         self.foot_sites = self.find_sites(members[0].feet, preserve_order=True)[0]
         self._set_gains()
         self._set_state()
@@ -100,6 +101,15 @@ class Robot(Entity):
             getattr(self, name)[worlds] = values
         self._set_gains()
         self._set_state()
+
+    def set_motors(self, factors: torch.Tensor) -> None:
+        """Multiply the torque of each motor at any command, also its limits.
+
+        Args:
+            factors: shape (worlds, joints); `peak_torque` and `stall_torque` stay nominal.
+        """
+        self._motors = factors
+        self._set_gains()
 
     def numbers(self) -> dict[str, torch.Tensor]:
         """The numbers of each world's design by name, to save them."""
@@ -140,7 +150,9 @@ class Robot(Entity):
         stiffness, damping = self.cfg.actuation.stiffness, self.cfg.actuation.damping
         for actuator in self.actuators:
             joints = actuator.target_ids
-            torque, stall = self.peak_torque[:, joints], self.stall_torque[:, joints]
+            factors = self._motors[:, joints]
+            torque = factors * self.peak_torque[:, joints]
+            stall = factors * self.stall_torque[:, joints]
             values = {
                 "stiffness": stiffness * torque,
                 "damping": damping * torque,

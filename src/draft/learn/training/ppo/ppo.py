@@ -1,9 +1,10 @@
 """PPO with rsl-rl's models, storage and checkpoints, and an update that is fast on CPUs.
 
-It differs from rsl-rl's PPO in four ways. Observations are normalised by statistics that change
+It differs from rsl-rl's PPO in five ways. Observations are normalised by statistics that change
 only between iterations; in rsl-rl they change during a rollout, and the update then measures a KL
 divergence that no gradient caused. All processes share these statistics. Gradients and KL
-divergence of a mini-batch are reduced together. The networks can be kept mirror-symmetric.
+divergence of a mini-batch are reduced together. The networks can be kept mirror-symmetric. The
+learning rate and the weight of the entropy can decay at the end.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from draft.learn.task.world.mirror import flips
 from draft.learn.training.ppo.symmetry import Symmetric
 
 _HIGHEST_RATE = 1e-2
+_LAST = 0.05  # Learning rate and weight of the entropy at the end of a training that decays.
 _LOG_2PI = math.log(2 * math.pi)
 _ASYMMETRIC = 1e-3  # Relative change of weights by a projection that is more than rounding.
 
@@ -48,6 +50,7 @@ class Ppo(PPO):
         """
         super().__init__(*args, **more)
         self.least_rate, self._symmetric = least_rate, symmetric
+        self._first_rate, self._factor = self.learning_rate, 1.0
         self.learns_actor = True
         parameters = [*self.actor.parameters(), *self.critic.parameters()]
         self.optimizer = torch.optim.Adam(parameters, lr=self.learning_rate, fused=True)
@@ -105,6 +108,14 @@ class Ppo(PPO):
                 raise DraftError(cause, "`values` learning.mirror=false")
             self._symmetry.project()
         return loaded
+
+    def decay(self, share: float) -> None:
+        """Limit the learning rate, and the weight of the entropy.
+
+        Args:
+            share: share of the decay that is done, from 0 to 1.
+        """
+        self._factor = _LAST**share
 
     def update(self) -> dict[str, float]:
         """Learn from the rollout, then add its observations to the statistics.
@@ -187,7 +198,9 @@ class Ppo(PPO):
         value = value.mean()
         # A weight of zero, since processes share the gradients of all parameters.
         share = float(self.learns_actor)
-        loss = self.value_loss_coef * value + share * (surrogate - self.entropy_coef * entropy)
+        loss = self.value_loss_coef * value + share * (
+            surrogate - self._factor * self.entropy_coef * entropy
+        )
         self.optimizer.zero_grad(set_to_none=False)
         loss.backward()
         kl = self._reduce(kl)
@@ -211,6 +224,8 @@ class Ppo(PPO):
             self.learning_rate = max(self.least_rate, self.learning_rate / 1.5)
         elif 0.0 < kl < 0.5 * self.desired_kl:
             self.learning_rate = min(_HIGHEST_RATE, self.learning_rate * 1.5)
+        if self._factor < 1.0:
+            self.learning_rate = min(self.learning_rate, self._factor * self._first_rate)
         for group in self.optimizer.param_groups:
             group["lr"] = self.learning_rate
 

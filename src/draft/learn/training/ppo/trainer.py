@@ -219,10 +219,16 @@ class Trainer:
             raise self._diverged("observations")
         if isinstance(alg, Ppo):
             alg.learns_actor = self.iteration >= self._alone
+            alg.decay(self._decayed())
         losses = alg.update()
         if not self._ranks.all(all(math.isfinite(value) for value in losses.values())):
             raise self._diverged("losses")
         return losses
+
+    def _decayed(self) -> float:
+        """Share of the decay of the learning rate that is done."""
+        last = self._run.plan.config.learning.decay * self._total
+        return max(0.0, 1.0 - (self._total - self.iteration) / last) if last else 0.0
 
     def _turn(self) -> None:
         """Give some worlds new bodies of the family; their episodes end as if by time."""

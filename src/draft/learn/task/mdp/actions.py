@@ -1,0 +1,68 @@
+"""Joint targets that arrive late."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from mjlab.envs import ManagerBasedRlEnv
+from mjlab.envs.mdp.actions import JointPositionAction, JointPositionActionCfg
+
+_ROUNDED = 1e-9  # A delay of k physics steps is exactly k of them [s].
+
+
+@dataclass(kw_only=True)
+class DelayedTargetsCfg(JointPositionActionCfg):
+    """Configuration of joint targets that arrive late.
+
+    Attributes:
+        delay: least and greatest delay [s], at most a control period.
+    """
+
+    delay: tuple[float, float]
+
+    def build(self, env: ManagerBasedRlEnv) -> DelayedTargets:
+        """Build the term."""
+        return DelayedTargets(self, env)
+
+
+# Attributes of terms are part of saved states (see `snapshot`).
+class DelayedTargets(JointPositionAction):
+    """Joint targets that arrive later than they are sent, by a delay of each world.
+
+    A world draws its delay when it is reset, and holds the target before until it has passed. The
+    first target after a reset is preceded by the home pose.
+    """
+
+    cfg: DelayedTargetsCfg
+
+    def __init__(self, cfg: DelayedTargetsCfg, env: ManagerBasedRlEnv) -> None:
+        super().__init__(cfg, env)
+        self._delay = self._drawn()
+        self._before = self._offset + torch.zeros_like(self._raw_actions)
+        self._since = 0.0
+
+    def process_actions(self, actions: torch.Tensor) -> None:
+        """Take new targets; those of the step before hold until the delay has passed."""
+        self._before = self._offset + self._scale * self._raw_actions
+        self._since = 0.0
+        super().process_actions(actions)
+
+    def apply_actions(self) -> None:
+        """Set the targets of one physics step."""
+        new = self._processed_actions
+        late = (self._since < self._delay - _ROUNDED)[:, None]
+        self._processed_actions = torch.where(late, self._before, new)
+        super().apply_actions()
+        self._processed_actions = new
+        self._since += self._env.physics_dt
+
+    def reset(self, env_ids: torch.Tensor | slice | None = None) -> None:
+        """Draw the delays of worlds anew."""
+        super().reset(env_ids)
+        ids = slice(None) if env_ids is None else env_ids
+        self._delay[ids] = self._drawn()[ids]
+
+    def _drawn(self) -> torch.Tensor:
+        low, high = self.cfg.delay
+        return low + (high - low) * torch.rand(self.num_envs, device=self.device)
