@@ -200,6 +200,7 @@ class Design:
         segments: structural masses by segment.
         findings: findings of the design filter.
         battery_stated: stated energy [Wh] and mass [kg] of the battery, by name.
+        electronics_stated: stated power of computers, sensors and idle drives [W].
     """
 
     spec: Spec
@@ -213,6 +214,7 @@ class Design:
     segments: tuple[SegmentMass, ...]
     findings: tuple[Finding, ...]
     battery_stated: Mapping[str, Value] = field(default_factory=dict)
+    electronics_stated: Value | None = None
 
     def __repr__(self) -> str:
         joints = f"{len(self.joints)} joint{'' if len(self.joints) == 1 else 's'}"

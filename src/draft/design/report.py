@@ -10,6 +10,7 @@ from draft.design.actuators import Actuator, Origin
 from draft.design.bands import SHARES, actuator_bands
 from draft.design.battery import battery
 from draft.design.design import Body, Design, SegmentMass
+from draft.design.electronics import electronics
 from draft.design.plan import plan
 from draft.design.structure_law import leg_of_trunk, structure_laws, trunk_words
 from draft.laws import catalogue
@@ -62,6 +63,7 @@ def report(design: Design) -> dict[str, Any]:
             for name, actuator in design.actuators.items()
         },
         "battery": _battery(design),
+        "electronics": _electronics(design),
         "trunk": _trunk(design, population),
         "end_density_kg_m3": _end_density(population),
         "segments": [_segment(segment, population) for segment in design.segments],
@@ -220,17 +222,32 @@ def _by_leg_length(design: Design, population: Population) -> dict[str, Any] | N
 def _battery(design: Design) -> dict[str, Any]:
     """Record of the battery, whose mass is part of the trunk's."""
     found = battery(design)
-    law = found.law
-    record: dict[str, Any] = {
+    return {
         "energy_wh": found.energy,
         "mass_kg": found.mass,
         "origin": "trend" if not design.battery_stated else "stated",
         "band_of_energy_wh": {"90": list(found.band)},
+        **_of_law(found.law),
     }
-    if law is not None:
-        held_out = {f"held_out_{what}_error": error for what, error in law.held_out.items()}
-        record |= {"fit": law.formula, "n": law.n, **held_out, "source": law.source}
-    return record
+
+
+def _electronics(design: Design) -> dict[str, Any]:
+    """Record of the power of computers, sensors and idle drives."""
+    found = electronics(design)
+    return {
+        "power_w": found.power,
+        "origin": "stated" if found.law is None else "trend",
+        "band_of_power_w": {"90": list(found.band)},
+        **_of_law(found.law),
+    }
+
+
+def _of_law(law: Law | None) -> dict[str, Any]:
+    """Record of the law that gave a number; nothing for a stated one."""
+    if law is None:
+        return {}
+    held_out = {f"held_out_{what}_error": error for what, error in law.held_out.items()}
+    return {"fit": law.formula, "n": law.n, **held_out, "source": law.source}
 
 
 def _trunk(design: Design, population: Population) -> dict[str, Any]:

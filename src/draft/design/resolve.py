@@ -26,6 +26,7 @@ from draft.laws.quantities import QUANTITIES
 from draft.laws.structure import MIDDLE
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
+from draft.spec.expressions import Expression
 from draft.spec.payload import PLACE
 from draft.spec.primitives.loft import Loft
 from draft.spec.primitives.root import TrunkPart, make_trunk
@@ -105,12 +106,16 @@ class _Resolver:
                 name: self.r.positive(expression, f"{name} of the battery")
                 for name, expression in spec.battery.items()
             },
+            electronics_stated=self.electronics(spec.electronics_power),
         )
         design = replace(design, trunk=trunk_by_law(design))
         design = replace(design, trunk=trunk_with_battery(design))
         judged = replace(design, findings=inspect(design, p, self.r.invalid))
         hand_on(design, judged)
         return judged
+
+    def electronics(self, stated: Expression | None) -> Value | None:
+        return None if stated is None else self.r.positive(stated, "the power of the electronics")
 
     def parameter(self, parameter: Parameter) -> None:
         """Evaluate a parameter and check its bounds."""

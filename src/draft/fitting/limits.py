@@ -37,8 +37,9 @@ class Points(NamedTuple):
 
 def laws() -> dict[str, Law]:
     """Fit every law."""
-    overload, corners, batteries = (
-        table(name) for name in ("overload_times", "torque_speed_corners", "legged_batteries")
+    overload, corners, batteries, standing = (
+        table(name)
+        for name in ("overload_times", "torque_speed_corners", "legged_batteries", "standing_power")
     )
     stall_share = _stall_share(overload)
     share = stall_share.coefficient
@@ -98,6 +99,15 @@ def laws() -> dict[str, Law]:
             _columns(batteries, "robot_mass_kg", "battery_energy_wh", _maker),
             _median_ratio,
             ("maker", "legged_batteries.csv"),
+        ),
+        "electronics_power": _law(
+            "electronics_power",
+            "W",
+            "power of electronics = {:.4g} robot mass",
+            ("robot_mass", "kg"),
+            _columns(standing, "robot_mass_kg", "standing_power_w", _maker),
+            _median_ratio,
+            ("maker", "standing_power.csv"),
         ),
     }
 

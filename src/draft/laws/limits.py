@@ -1,4 +1,4 @@
-"""Laws of what a machine can sustain: overload times, torque-speed corners, batteries.
+"""Laws of what a machine can sustain: overload times, torque-speed corners, batteries, electronics.
 
 Coefficients, scores and bands come from `draft.fitting.limits`; docs/limits.md tells the data and
 their doubts.
@@ -30,6 +30,7 @@ class Limits:
         specific_energy: energy of a battery [Wh], from its mass [kg].
         battery_share: mass of a battery [kg], from the mass of the robot [kg].
         energy_share: energy of a battery [Wh], from the mass of the robot [kg].
+        electronics_power: power that a robot draws without moving [W], from its mass [kg].
     """
 
     stalled: Law
@@ -39,6 +40,7 @@ class Limits:
     specific_energy: Law
     battery_share: Law
     energy_share: Law
+    electronics_power: Law
 
 
 @lru_cache(maxsize=1)

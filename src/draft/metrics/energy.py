@@ -1,4 +1,4 @@
-"""Energy metrics: endurance and range of the battery."""
+"""Energy metrics: power while standing, endurance and range of the battery."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from draft.design import Design
 from draft.design.battery import battery
+from draft.design.electronics import electronics
 from draft.design.legs import GRAVITY
 from draft.errors import DraftError
 from draft.metrics.registry import metric
@@ -19,19 +20,33 @@ JOULES_PER_WATT_HOUR = 3600.0
 
 
 @metric(
+    unit="W",
+    formula="electronics_power + cost_of_standing M",
+    source="power of robots that stand, docs/limits.md; heat of the motors as cost_of_standing",
+    better="less",
+)
+def standing_power(design: Design) -> Value:
+    """Electrical power while the robot stands in the crouch [W].
+
+    It is that of computers, sensors and idle drives (`draft.design.electronics`), and the heat of
+    the motors, an upper bound for motors with a current limit.
+    """
+    return electronics(design).power + cost_of_standing(design) * design.mass
+
+
+@metric(
     unit="h",
-    formula="energy of the battery / (cost_of_standing M)",
-    source="energy of surveyed batteries, docs/limits.md; heat of the motors as cost_of_standing",
+    formula="energy of the battery / standing_power",
+    source="energy of surveyed batteries, docs/limits.md; power as standing_power",
     better="more",
 )
 def endurance_standing(design: Design) -> Value:
-    """Time that the battery feeds the motors while the robot stands in the crouch [h].
+    """Time that the battery lasts while the robot stands in the crouch [h].
 
-    Computers, sensors and drives draw power too, which the design does not tell. The losses are
-    those of `cost_of_standing`, an upper bound for motors with a current limit. Energy: 90 % of
-    surveyed robots have within `draft.design.battery.Battery.band` of the usual one.
+    Energy: 90 % of surveyed robots have within `draft.design.battery.Battery.band` of the usual
+    one, and draw within `draft.design.electronics.Electronics.band`.
     """
-    return divide(battery(design).energy, cost_of_standing(design) * design.mass)
+    return divide(battery(design).energy, standing_power(design))
 
 
 class Travel(NamedTuple):
@@ -57,8 +72,8 @@ def travel(design: Design, power: Value, speed: Value) -> Travel:
 
     Args:
         design: one design, or N.
-        power: mean electrical power [W]: mechanical power and heat of the motors, as `draft
-            evaluate` measures them, and whatever else draws from the battery.
+        power: mean electrical power of the motors [W]: mechanical power and heat, as `draft
+            evaluate` measures them; that of the electronics is added.
         speed: mean speed [m/s].
 
     Raises:
@@ -68,7 +83,8 @@ def travel(design: Design, power: Value, speed: Value) -> Travel:
         if not np.all((np.asarray(value) > 0) & (np.asarray(value) < math.inf)):
             cause = f"a {name} of {value} {unit}"
             raise DraftError(cause, "give numbers above zero")
-    return travel_of(battery(design).energy, design.mass, power, speed)
+    whole = power + electronics(design).power
+    return travel_of(battery(design).energy, design.mass, whole, speed)
 
 
 def travel_of(energy: Value, mass: Value, power: Value, speed: Value) -> Travel:

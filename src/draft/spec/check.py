@@ -38,7 +38,7 @@ def check_spec(spec: Spec) -> None:
         _duplicate_problems(spec.bodies),
         _actuator_problems(spec),
         _structure_problems(spec.bodies),
-        (p for e in spec.battery.values() if (p := expression_problem(spec, e)) is not None),
+        _supply_problems(spec),
         _allow_problems(spec),
         *(design_problems(spec, design) for design in spec.designs.values()),
     )
@@ -129,6 +129,14 @@ def drives(spec: Spec) -> dict[int, int]:
                 break
             above = spec.bodies[above].parent
     return taken
+
+
+def _supply_problems(spec: Spec) -> Iterator[Problem]:
+    """Problems of the battery's numbers and of the power of the electronics."""
+    stated = (*spec.battery.values(), spec.electronics_power)
+    for expression in stated:
+        if expression is not None and (found := expression_problem(spec, expression)) is not None:
+            yield found
 
 
 def _reserved_problems(spec: Spec) -> Iterator[Problem]:

@@ -200,6 +200,7 @@ def _spec(
             item: parameters_source.at(("allow", i)) for i, item in enumerate(parameters_file.allow)
         },
         battery=_battery(parameters_file, parameters_source),
+        electronics_power=_electronics_power(parameters_file, parameters_source),
     )
     check_spec(spec)
     return spec
@@ -287,6 +288,12 @@ def _battery(file: schema.ParametersFile, source: Source) -> dict[str, Expressio
         for name in type(file.battery).model_fields
         if (value := getattr(file.battery, name)) is not None
     }
+
+
+def _electronics_power(file: schema.ParametersFile, source: Source) -> Expression | None:
+    if file.electronics_power is None:
+        return None
+    return parse(file.electronics_power, source.at(("electronics_power",)))
 
 
 def _design(source: Source) -> NamedDesign:

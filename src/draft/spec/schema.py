@@ -197,6 +197,9 @@ class ParametersFile(Model):
     battery: Battery | None = None
     """Battery in the trunk. Default: the share of the mass that surveyed robots have. The trend of
     the trunk's mass includes such a battery; a stated one replaces it."""
+    electronics_power: Number | None = None
+    """Power of computers, sensors and idle drives [W]. Default: what robots of its mass draw that
+    stand."""
     allow: list[str] = Field([])
     """Errors of the design filter to accept as warnings: `id` or `id:where`."""
 

@@ -82,6 +82,7 @@ class Spec:
         allow: errors of the design filter to accept as warnings, with their places.
         payload: index of the body that is a payload on the trunk; None without one.
         battery: stated energy [Wh] and mass [kg] of the battery, by name.
+        electronics_power: stated power of computers, sensors and idle drives [W].
     """
 
     name: str
@@ -100,6 +101,7 @@ class Spec:
     allow: Mapping[str, Location]
     payload: int | None = None
     battery: Mapping[str, Expression] = field(default_factory=dict)
+    electronics_power: Expression | None = None
 
     @classmethod
     def parse(cls, files: Mapping[str, str | bytes | Mapping[str, object]]) -> Spec:

@@ -113,8 +113,12 @@ def _supply(supply: Supply) -> str:
     """Return what range and endurance rest on."""
     energy, (low, high) = supply.energy_wh, supply.band_of_energy_wh
     band = f" (90 % band {low:.0f} .. {high:.0f})" if high > low else ""
+    drawn = "the motors alone"
+    if supply.electronics_w:
+        drawn = f"the motors and of {supply.electronics_w:.0f} W of electronics, "
+        drawn += supply.electronics_origin
     return (
-        f"range and endurance are those of the motors alone on a battery of {energy:.0f} Wh{band}, "
+        f"range and endurance are those of {drawn}, on a battery of {energy:.0f} Wh{band}, "
         f"{supply.origin}"
     )
 

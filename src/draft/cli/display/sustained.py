@@ -9,6 +9,7 @@ from rich.table import Table
 from draft.cli.display.verdict import console
 from draft.design import Design
 from draft.design.battery import battery
+from draft.design.electronics import electronics
 from draft.metrics import of_design, overload, payload_for
 from draft.metrics.heat import HOUR, hold_time_fold
 from draft.values import brief, scalar
@@ -63,11 +64,14 @@ def print_limits(design: Design) -> None:
     text = "battery" if design.battery_stated else "battery, usual for its mass"
     band = "" if known else f"{low} .. {high}"
     table.add_row(text, brief(scalar(energy.energy)), "Wh", band)
-    hours = scalar(of_design(design, ["endurance_standing"])["endurance_standing"])
-    ratio = [scalar(end / energy.energy) for end in energy.band]
-    band = "" if known else f"{hours * ratio[0]:.2g} .. {hours * ratio[1]:.2g}"
-    name = "endurance_standing"
-    table.add_row("standing on it, motors alone", f"{hours:.2g}", "h", band, name)
+    power, hours = of_design(design, ["standing_power", "endurance_standing"]).values()
+    drawn = electronics(design)
+    band = " .. ".join(f"{scalar(power - drawn.power + end):.3g}" for end in drawn.band)
+    band = "" if drawn.law is None else band
+    table.add_row("power while standing", f"{scalar(power):.3g}", "W", band, "standing_power")
+    ends = [scalar(hours * end / energy.energy) for end in energy.band]
+    band = "" if known else f"{ends[0]:.2g} .. {ends[1]:.2g}"
+    table.add_row("standing on it", f"{scalar(hours):.2g}", "h", band, "endurance_standing")
     console().print(table, "")
     if words := own_weight(design):
         console().print(words, "", markup=False)

@@ -63,6 +63,8 @@ class LeggedRobot:
             a corner.
         battery: energy of a stated battery, and the ends of its 90 % band [Wh]; () if the design
             states none.
+        electronics: stated power of computers, sensors and idle drives [W]; () if the design states
+            none.
     """
 
     name: str
@@ -87,6 +89,7 @@ class LeggedRobot:
     mirror_sign: tuple[float, ...]
     corner_speed: tuple[float, ...] = ()
     battery: tuple[float, ...] = ()
+    electronics: tuple[float, ...] = ()
 
     @property
     def xml(self) -> str:
@@ -154,7 +157,7 @@ class LeggedRobot:
 
 
 # Defaults of the fields that were added later: older records lack them.
-_LATER: dict[str, Any] = {"corner_speed": (), "battery": ()}
+_LATER: dict[str, Any] = {"corner_speed": (), "battery": (), "electronics": ()}
 
 
 def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
@@ -203,6 +206,7 @@ def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
         mirror_sign=tuple(sign[joint] for joint in joints),
         corner_speed=corners(_of_actuators(design, "corner_speed")),
         battery=tuple(map(scalar, stated_battery(design))),
+        electronics=tuple(map(scalar, stated_electronics(design))),
     )
 
 
@@ -217,6 +221,11 @@ def stated_battery(design: Design) -> tuple[Value, ...]:
         return ()
     found = battery(design)
     return found.energy, *found.band
+
+
+def stated_electronics(design: Design) -> tuple[Value, ...]:
+    """Stated power of the electronics [W]; () if none is stated."""
+    return () if design.electronics_stated is None else (design.electronics_stated,)
 
 
 def with_one_template(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]:

@@ -24,6 +24,7 @@ from draft.learn.bodies.legged import (
     lowest_point,
     radius_of_foot,
     stated_battery,
+    stated_electronics,
 )
 from draft.learn.bodies.topology import APART
 from draft.metrics.speed import top_speed
@@ -90,7 +91,8 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
             corners(row) for row in _tuples(_table(design, [m.corner_speed for m in motors])[rows])
         ],
         "no_load_speed": _tuples(_table(design, [m.no_load_speed for m in motors])[rows]),
-        "battery": _batteries(design, rows),
+        "battery": _stated(design, stated_battery(design), rows),
+        "electronics": _stated(design, stated_electronics(design), rows),
         "leg_length": _column(design, maximum(*(leg.length for leg in legs(design))), rows),
         "foot_radius": _foot_radii(batch, first),
         "height": _heights(batch, first, home[rows]),
@@ -179,8 +181,8 @@ def _column(design: Design, value: Value, rows: Rows) -> list[float]:
     return np.broadcast_to(value, (design.count or 1,))[rows].tolist()
 
 
-def _batteries(design: Design, rows: Rows) -> list[tuple[float, ...]]:
-    stated = stated_battery(design)
+def _stated(design: Design, stated: tuple[Value, ...], rows: Rows) -> list[tuple[float, ...]]:
+    """Numbers that all designs state, or none does, by design."""
     return _tuples(_table(design, [*stated])[rows]) if stated else [()] * len(rows)
 
 

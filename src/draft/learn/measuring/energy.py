@@ -3,8 +3,8 @@
 The electrical power of a joint is its mechanical power where it drives the joint, plus the heat of
 its motor. A joint that brakes returns nothing to the battery unless a share of regeneration is
 given. The heat is tau^2 w_NL / tau_stall, the copper loss of a motor with that torque-speed line:
-an upper bound for one that states no corner (docs/limits.md). Computers, sensors and the losses of
-drives are not in it.
+an upper bound for one that states no corner (docs/limits.md). Cost of transport, endurance and
+range are those of the whole robot: the power of its electronics is added.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 
 from draft.design.bands import Band
 from draft.design.battery import Battery, usual
+from draft.design.electronics import usual_electronics
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.measuring.scalars import Curve
 from draft.metrics.energy import travel_of
@@ -30,17 +31,34 @@ def supply(member: LeggedRobot) -> tuple[float, Band, bool]:
     return float(found.energy), found.band, False
 
 
+def electronics_power(member: LeggedRobot) -> float:
+    """Power of a robot's computers, sensors and idle drives [W]: stated, or usual for its mass."""
+    if member.electronics:
+        return member.electronics[0]
+    return float(usual_electronics(member.mass).power)
+
+
 def supply_record(member: LeggedRobot) -> dict[str, Any]:
-    """The battery as plain data."""
+    """The battery and the power of the electronics as plain data."""
     energy, band, stated = supply(member)
-    origin = "stated" if stated else "usual for its mass"
-    return {"energy_wh": energy, "band_of_energy_wh": [*map(float, band)], "origin": origin}
+    return {
+        "energy_wh": energy,
+        "band_of_energy_wh": [*map(float, band)],
+        "origin": _origin(stated),
+        "electronics_w": electronics_power(member),
+        "electronics_origin": _origin(bool(member.electronics)),
+    }
+
+
+def _origin(stated: bool) -> str:
+    return "stated" if stated else "usual for its mass"
 
 
 def add_energy(by_test: Mapping[str, Curve], member: LeggedRobot, payload: float = 0.0) -> None:
     """Add cost of transport, endurance [h] and range [m] to curves that have power and speed.
 
-    They are those of the median power and the median speed of a level; None where either is
+    They are those of the median power, with the electronics, and the median speed of a level; None
+    where either is
     missing or not above zero.
 
     Args:
@@ -49,10 +67,11 @@ def add_energy(by_test: Mapping[str, Curve], member: LeggedRobot, payload: float
         payload: mass that it carries [kg], part of the mass that is moved.
     """
     energy, mass = supply(member)[0], member.mass + payload
+    idle = electronics_power(member)
     for curve in by_test.values():
         pairs = zip(curve.get("power", []), curve["speed"], strict=True)
         rows = [
-            travel_of(energy, mass, power, speed) if power and speed and speed > 0 else None
+            travel_of(energy, mass, idle + power, speed) if power and speed and speed > 0 else None
             for power, speed in pairs
         ]
         for i, name in enumerate(NAMES):

@@ -67,17 +67,22 @@ class _Record(BaseModel):
 
 
 class Supply(_Record):
-    """Battery of a design.
+    """Battery and electronics of a design.
 
     Attributes:
         energy_wh: energy [Wh].
         band_of_energy_wh: ends of its 90 % band [Wh].
         origin: whether the design states it.
+        electronics_w: power of computers, sensors and idle drives [W]; 0 where an older Draft left
+            it out.
+        electronics_origin: whether the design states it.
     """
 
     energy_wh: float
     band_of_energy_wh: tuple[float, float]
     origin: str
+    electronics_w: float = 0.0
+    electronics_origin: str = ""
 
 
 class Measured(_Record):
