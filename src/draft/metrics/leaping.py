@@ -39,9 +39,19 @@ class PushOff(NamedTuple):
 @once
 def push_off(design: Design) -> PushOff:
     """Push-off of the worst kind of leg, each with its share of the mass; NaN without knees."""
+    return push_off_of(design, design.mass)
+
+
+def push_off_of(design: Design, mass: Value) -> PushOff:
+    """Push-off of a design with another mass.
+
+    Args:
+        design: one design, or N.
+        mass: mass that is moved [kg].
+    """
     n = count(design)
     found = [
-        _push_off(leg, leg.knee.actuator, design.mass / n)
+        _push_off(leg, leg.knee.actuator, mass / n)
         for leg in legs(design)
         if leg.knee.actuator is not None
     ]

@@ -7,7 +7,7 @@ All is in the trunk's frame, with every joint at zero.
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -105,13 +105,11 @@ def pairs(
     data, own_data = _at_zero(vendor), _at_zero(twin)
     at, turn = reduced.base
     found: list[Pair] = []
-    for body in reduced.root.all():
-        if body.joint is None:
-            own, gaps = 1, (0.0, 0.0)
-        elif body.joint.name in joints:
+    for body, own in counterparts(reduced, twin, joints):
+        gaps = (0.0, 0.0)
+        if body.joint is not None:
             theirs = vendor.joint(body.joint.name).id
             ours = twin.joint(joints[body.joint.name]).id
-            own = int(twin.jnt_bodyid[ours])
             # A hinge between the vendor's base and the trunk is seen from its other side.
             sense = np.sign((turn @ data.xaxis[theirs]) @ body.axis)
             gaps = _gaps(
@@ -119,8 +117,6 @@ def pairs(
                 sense * turn @ data.xaxis[theirs],
                 own_data.xaxis[ours],
             )
-        else:
-            continue
         found.append(
             Pair(
                 name=body.name,
@@ -134,6 +130,23 @@ def pairs(
             )
         )
     return found
+
+
+def counterparts(
+    reduced: Reduced, twin: mujoco.MjModel, joints: Mapping[str, str]
+) -> Iterator[tuple[Body, int]]:
+    """Yield each rigid body of a vendor's robot with its body in the twin's model, trunk first.
+
+    Args:
+        reduced: the vendor's robot.
+        twin: the twin's model; the trunk is its first body.
+        joints: the twin's hinges by the vendor's names; bodies of others are left out.
+    """
+    for body in reduced.root.all():
+        if body.joint is None:
+            yield body, 1
+        elif body.joint.name in joints:
+            yield body, int(twin.jnt_bodyid[twin.joint(joints[body.joint.name]).id])
 
 
 def _group(body: Body) -> str:

@@ -47,6 +47,7 @@ class Source:
         region: region of validity.
         forward: largest forward speed that it was commanded [m/s]; of a family, the mean over its
             bodies.
+        leg_length: leg length of the robot that it was trained with [m]; of a family, the mean.
         network: function from a device to one that makes the policy for an environment of its own
             robots.
         line: its iteration and whether its training is finished, in one line.
@@ -61,6 +62,7 @@ class Source:
     structure: Structure | None
     region: Region
     forward: float
+    leg_length: float
     network: Callable[[str], Callable[[ManagerBasedRlEnv], Actor]]
     line: str
 
@@ -72,6 +74,10 @@ class Source:
         """
         outside = departures(self.region, member, features(member), self.match(member))
         return sentence(self.region.name, outside)
+
+    def forward_for(self, member: LeggedRobot) -> float:
+        """Largest forward speed that the policy was commanded, at the size of a robot [m/s]."""
+        return self.forward * math.sqrt(member.leg_length / self.leg_length)
 
     def actor(self, device: str) -> Callable[[ManagerBasedRlEnv], Actor]:
         """Return a function that makes the policy for an environment of any robots it drives.
@@ -145,7 +151,8 @@ def of_run(run: Run, blind: bool = False) -> Source:
     robot = first.joints, structure_of(first)
     of_file = file, iteration, file_digest(file)
     line = f"{run.folder}: {run.policy_line(iteration)}"
-    return Source(str(run.folder), *of_file, plan, *robot, region, forward, network, line)
+    length = sum(member.leg_length for member in plan.members) / len(plan.members)
+    return Source(str(run.folder), *of_file, plan, *robot, region, forward, length, network, line)
 
 
 def _of_file(policy: Policy, name: str, blind: bool = False) -> Source:
@@ -170,7 +177,8 @@ def _of_file(policy: Policy, name: str, blind: bool = False) -> Source:
     robot = policy.joints, trained_structure(policy)
     of_file = policy.file, policy.iterations, file_digest(policy.file)
     line = f"{name}: policy: iteration {policy.iterations}"
-    return Source(name, *of_file, plan, *robot, region, policy.forward, network, line)
+    reach = policy.forward, policy.leg_length
+    return Source(name, *of_file, plan, *robot, region, *reach, network, line)
 
 
 def _config(policy: Policy) -> Config:

@@ -1,0 +1,1 @@
+"""Capabilities of real robots: by the maker's masses, by predicted ones, and as published."""

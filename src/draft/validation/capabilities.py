@@ -1,0 +1,221 @@
+"""Capabilities of a robot by one policy, with intervals, and what limits them.
+
+Speeds are measured at commands that the policy was trained with, over the last two thirds of a
+roll-out. Intervals are those of a bootstrap over the roll-outs, from 5 to 95 %: they say how sure
+the measurement is, not how right the model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from draft.design import Design
+from draft.design.battery import battery
+from draft.design.electronics import electronics
+from draft.design.legs import GRAVITY
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.engine.machine import NATIVE, Engine, cores
+from draft.learn.measuring.conditions import with_conditions
+from draft.learn.measuring.evaluation_options import Extras
+from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SKILL_TESTS, SPEED, SkillTest
+from draft.learn.measuring.policies import Source
+from draft.learn.measuring.scalars import Worlds, curves, kick, tallest, top_speed
+from draft.metrics.energy import travel_of
+from draft.metrics.leaping import push_off_of
+from draft.validation.standing import standing
+from draft.values import scalar
+
+SPEEDS = 8  # Commands up to the fastest that was trained.
+WALKING = 0.5  # Commanded speed of a walk, per sqrt(g L).
+KICKS = (1.0, 1.5, 2.0, 2.5, 3.0, 3.5)  # Per sqrt(g L).
+STEPS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)  # Per L.
+REPLICAS, SECONDS, SETTLE = 16, 9.0, 3.0
+_DRAWS, _ENDS = 400, (0.05, 0.95)
+Report = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A capability.
+
+    Attributes:
+        value: the number; NaN if there is none.
+        low, high: ends of its interval; those of a number in closed form are the number.
+        limit: what limits it; "" if nothing is known.
+        reason: why there is none.
+    """
+
+    value: float
+    low: float
+    high: float
+    limit: str = ""
+    reason: str = ""
+
+    @staticmethod
+    def exact(value: float, limit: str = "") -> Estimate:
+        """A number in closed form."""
+        return Estimate(value, value, value, limit)
+
+    @staticmethod
+    def none(reason: str) -> Estimate:
+        """No number."""
+        return Estimate(math.nan, math.nan, math.nan, reason=reason)
+
+
+def in_closed_form(member: LeggedRobot, design: Design) -> dict[str, Estimate]:
+    """Mass, load that a standing robot holds, jump, and power and endurance while it stands.
+
+    Args:
+        member: the robot, whose masses count.
+        design: its design, for motors, battery and electronics.
+    """
+    held = standing(member, design)
+    idle = scalar(electronics(design).power)
+    power = idle + held.heat
+    return {
+        "mass": Estimate.exact(member.mass),
+        "payload_peak": Estimate.exact(held.payload(held.peak), "peak torque"),
+        "payload_rated": Estimate.exact(held.payload(held.rated), "rated torque"),
+        "jump_height": Estimate.exact(scalar(push_off_of(design, member.mass).height)),
+        "standing_power": Estimate.exact(power),
+        "endurance_standing": Estimate.exact(scalar(battery(design).energy) / power),
+    }
+
+
+def measured(
+    source: Source,
+    member: LeggedRobot,
+    design: Design,
+    device: str,
+    engine: Engine,
+    *,
+    replicas: int = REPLICAS,
+    seconds: float = SECONDS,
+    seed: int = 0,
+    conditions: Extras | None = None,
+    speeds: tuple[float, ...] = (),
+    stairs: bool = True,
+    report: Report = lambda what, step, steps: None,
+) -> dict[str, Estimate]:
+    """Capabilities of a robot from roll-outs of a policy.
+
+    Args:
+        source: the policy.
+        member: the robot.
+        design: its design, for battery and electronics.
+        device: "cpu" or "cuda:0" and the like.
+        engine: physics engine.
+        replicas: roll-outs at each level.
+        seconds: duration of a roll-out [s]; the first third is not measured.
+        seed: seed of everything random.
+        conditions: physics that differs from that of the training.
+        speeds: further speeds at which the power is wanted [m/s].
+        stairs: whether to climb and descend stairs.
+        report: called after every step with the tests' names, steps done and total steps.
+
+    Raises:
+        DraftError: the policy does not drive the robot, or the physics is impossible.
+    """
+    from draft.learn.measuring.rollout.evaluate import evaluate
+    from draft.learn.measuring.rollout.trial import Trial
+    from draft.learn.training.ppo.trainer import task_of
+
+    source.match(member)
+    root = math.sqrt(GRAVITY * member.leg_length)
+    most = source.forward_for(member)
+    commands = {round(most * (i + 1) / SPEEDS, 3) for i in range(SPEEDS)}
+    commands |= {round(WALKING * root, 3), *(round(speed, 3) for speed in speeds)}
+    tests = [
+        _test(SPEED, tuple(sorted(commands))),
+        _test(PUSH, tuple(round(k * root, 3) for k in KICKS), walking=WALKING * root),
+    ]
+    if stairs:
+        heights = tuple(round(share * member.leg_length, 4) for share in STEPS)
+        tests += [_test(name, heights, walking=WALKING * root) for name in (ASCENT, DESCENT)]
+    task = replace(
+        task_of(source.plan),
+        members=(member,),
+        config=with_conditions(source.plan.config, conditions or Extras()),
+    )
+    trial = Trial(
+        task, tuple(tests), replicas, seed=seed, seconds=seconds, settle=seconds * SETTLE / SECONDS
+    )
+    threads = cores() if engine.name == NATIVE else 1
+    worlds, _ = evaluate(
+        trial, source.actor(device), device, report, engine=engine.name, threads=threads
+    )
+    walking = min(commands, key=lambda speed: abs(speed - WALKING * root))
+    values = _numbers(worlds, member, design, walking)
+    drawn = _resampled(worlds, member, design, walking, seed)
+    found = {}
+    for name, value in values.items():
+        if value is None:
+            found[name] = Estimate.none(_WHY.get(name, "too few stay up"))
+            continue
+        low, high = np.quantile(drawn[name], _ENDS) if drawn[name] else (value, value)
+        found[name] = Estimate(value, float(low), float(high))
+    return found
+
+
+_WHY = {"step_up": "it climbs no step", "step_down": "it descends no step"}
+
+
+def _test(name: str, levels: tuple[float, ...], walking: float | None = None) -> SkillTest:
+    test = replace(SKILL_TESTS[name], levels=levels)
+    return test if walking is None else replace(test, walking=walking)
+
+
+def _numbers(
+    worlds: Worlds, member: LeggedRobot, design: Design, walking: float
+) -> dict[str, float | None]:
+    """Capabilities of roll-outs by name; None where there is none."""
+    by_test = curves(worlds)
+    speed = by_test[SPEED]
+    best = top_speed(speed)
+    found: dict[str, float | None] = {
+        "top_speed": best[0] if best else None,
+        "peak_command": best[1] if best else None,
+    }
+    energy = scalar(battery(design).energy)
+    idle = scalar(electronics(design).power)
+    powers = speed.get("power") or []
+    at = speed["levels"].index(walking)
+    pace, power = speed["speed"][at], powers[at]
+    walks = speed["survival"][at] > 0 and pace is not None and pace > 0 and power is not None
+    row = travel_of(energy, member.mass, idle + power, pace) if walks else None
+    found["walking_speed"] = pace if walks else None
+    found["walking_power"] = idle + power if walks and power is not None else None
+    found["cost_of_transport"] = None if row is None else float(row.cost_of_transport)
+    found["endurance"] = None if row is None else float(row.endurance)
+    found["range"] = None if row is None else float(row.range)
+    for level, own in zip(speed["levels"], powers, strict=True):
+        found[f"power_at_{level:g}"] = None if own is None else idle + own
+    pushed = by_test[PUSH]
+    found["kick"] = kick(pushed["levels"], pushed.get("recovered", []))[0]
+    for name, test in (("step_up", ASCENT), ("step_down", DESCENT)):
+        if test in by_test:
+            curve = by_test[test]
+            found[name] = tallest(curve["levels"], curve.get("traversed", []))
+    return found
+
+
+def _resampled(
+    worlds: Worlds, member: LeggedRobot, design: Design, walking: float, seed: int
+) -> Mapping[str, list[float]]:
+    """Numbers of bootstrap samples of the roll-outs of each level, by name."""
+    rng = np.random.default_rng(seed)
+    groups: dict[tuple[str, float], list[int]] = {}
+    for i, key in enumerate(zip(worlds.test.tolist(), worlds.level.tolist(), strict=True)):
+        groups.setdefault(key, []).append(i)
+    drawn: dict[str, list[float]] = {}
+    for _ in range(_DRAWS):
+        rows = np.concatenate([rng.choice(own, len(own)) for own in groups.values()])
+        for name, value in _numbers(worlds.of(rows), member, design, walking).items():
+            found = drawn.setdefault(name, [])
+            if value is not None:
+                found.append(value)
+    return drawn
