@@ -96,6 +96,21 @@ def main(
             help_behavior_hint="(default: one per processor)",
         ),
     ] = None,
+    capabilities: Annotated[
+        bool,
+        tyro.conf.arg(
+            help="Measure what the robot can do, with its maker's masses and with predicted ones, "
+            "beside what is published (extra learn)."
+        ),
+    ] = False,
+    policy: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="RUN|FILE.onnx",
+            help="Policy of --capabilities.",
+            help_behavior_hint="(default: the policy that ships for its legs)",
+        ),
+    ] = None,
     json: JsonOutput = False,
 ) -> int:
     """Compare the masses and dynamics of a real robot with those that Draft predicts."""
@@ -120,11 +135,43 @@ def main(
         knee_drive=knee_drive,
         without=without,
     )
+    if capabilities:
+        _refuse("--capabilities", spec=spec, out=out, without=without)
+        return _capabilities(file, policy, population, options, seed, json)
+    _refuse("a comparison without --capabilities", policy=policy)
     with if_interrupted(NOTHING):
         found = compare_twin(
             file, spec, population=population, options=options, poses=poses, seed=seed
         )
     return _one(found, out, json)
+
+
+def _capabilities(
+    file: Path,
+    policy: str | None,
+    population: str | None,
+    options: Options,
+    seed: int,
+    json: bool,
+) -> int:
+    """Print what a robot can do in three columns."""
+    from draft.cli.display.capabilities import print_capabilities, record
+    from draft.validation.compare import real_robot
+
+    with if_interrupted(NOTHING), bar("roll-outs") as progress:
+        found = real_robot(
+            file,
+            policy=policy,
+            population=population,
+            options=options,
+            seed=seed,
+            report=lambda _, step, steps: progress(step, steps),
+        )
+    if json:
+        print(json_.dumps(record(found), indent=1))
+    else:
+        print_capabilities(found)
+    return 0
 
 
 def _one(found: Comparison, out: Path | None, json: bool) -> int:

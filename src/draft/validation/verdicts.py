@@ -62,9 +62,9 @@ def verdicts(key: str, leg_length: float, found: dict[str, Estimate]) -> list[Ve
         value = found[name].value if name in found else math.nan
         physical = name != "top_speed" or figure.high >= math.sqrt(GRAVITY * leg_length)
         word: Word = "right" if value >= figure.high else "below"
-        rows.append(
-            Verdict(name, figure, figure.high, word if value == value else "not measured", physical)
-        )
+        if math.isnan(value):
+            word = "not measured"
+        rows.append(Verdict(name, figure, figure.high, word, physical))
     power = walking_power(key)
     if power is not None:
         figure, watts = power
@@ -73,9 +73,9 @@ def verdicts(key: str, leg_length: float, found: dict[str, Estimate]) -> list[Ve
         word = "within" if fold <= ENERGY else "outside"
         if figure.bound == "most" and value <= watts:
             word = "within"
-        rows.append(
-            Verdict("walking_power", figure, watts, word if value == value else "not measured")
-        )
+        if math.isnan(value):
+            word = "not measured"
+        rows.append(Verdict("walking_power", figure, watts, word))
     rows += [
         Verdict("payload_walking", one, one.high, "not judged")
         for one in of_robot(key, "payload")[:1]

@@ -1,0 +1,144 @@
+"""Capabilities of a real robot in three columns: the maker's masses, predicted ones, published."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from draft.errors import DraftError
+from draft.imports.options import Options
+from draft.laws.survey import read
+from draft.learn.measuring.evaluation import setting
+from draft.learn.measuring.evaluation_options import Extras
+from draft.learn.measuring.policies import Source, open_source
+from draft.twins.compare import Comparison, compare_twin
+from draft.validation.arms import by_maker, predicted
+from draft.validation.capabilities import Estimate, in_closed_form, measured
+from draft.validation.published import figures
+from draft.validation.verdicts import Verdict, verdicts, walking_power
+
+Report = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RealRobot:
+    """A real robot's capabilities.
+
+    Attributes:
+        key: key of the robot in the survey, or its name.
+        twin: the comparison of its masses.
+        policy: name of the policy.
+        maker: capabilities with the masses of its maker, by name.
+        predicted: the same with the masses that Draft predicts.
+        verdicts: the predictions beside what is published; none for a robot without figures.
+        notes: what could not be measured, and doubts.
+    """
+
+    key: str
+    twin: Comparison
+    policy: str
+    maker: dict[str, Estimate]
+    predicted: dict[str, Estimate]
+    verdicts: tuple[Verdict, ...]
+    notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"RealRobot('{self.key}', {len(self.verdicts)} published figures)"
+
+
+def real_robot(
+    file: str | Path,
+    *,
+    policy: str | Path | None = None,
+    key: str = "",
+    options: Options | None = None,
+    population: str | None = None,
+    replicas: int = 16,
+    seconds: float = 9.0,
+    seed: int = 0,
+    conditions: Extras | None = None,
+    device: str = "auto",
+    engine: str = "auto",
+    report: Report = lambda what, step, steps: None,
+) -> RealRobot:
+    """Measure what a real robot can do, by its maker's masses and by those that Draft predicts.
+
+    Args:
+        file: the maker's description, as `draft.compare_twin` takes it.
+        policy: folder of a run or ONNX file; None for the policy that ships for its legs.
+        key: key of the robot in the survey, which is held out of the trends; "" for the name of the
+            file.
+        options: decisions that overrule the import's.
+        population: "humanoid" or "quadruped"; None as imported.
+        replicas: roll-outs at each level.
+        seconds: duration of a roll-out [s].
+        seed: seed of everything random.
+        conditions: physics that differs from that of the training.
+        device: device of the roll-outs.
+        engine: physics engine.
+        report: called after every step with the arm and tests, steps done and total steps.
+
+    Raises:
+        DraftError: the description cannot be used, or an argument is out of range.
+    """
+    key = key or Path(file).stem
+    known = _surveyed(key)
+    twin = compare_twin(
+        file,
+        population=population,
+        options=options or Options(),
+        without=(key,) if known else (),
+        key=key if known else "",
+    )
+    notes: list[str] = []
+    source = _policy(policy, twin, notes)
+    arms: dict[str, dict[str, Estimate]] = {}
+    members = {"maker": by_maker(twin), "predicted": predicted(twin)}
+    extra = walking_power(key)
+    for arm, member in members.items():
+        arms[arm] = in_closed_form(member, twin.design)
+        if source is None:
+            continue
+        where = setting(device, engine)
+        arms[arm] |= measured(
+            source,
+            member,
+            twin.design,
+            *where,
+            replicas=replicas,
+            seconds=seconds,
+            seed=seed,
+            conditions=conditions,
+            report=lambda what, step, steps, arm=arm: report(f"{arm}: {what}", step, steps),
+        )
+        if words := source.warning(member):
+            notes.append(words)
+    if extra is None and not any(one.robot == key for one in figures()):
+        notes.append(f"no published figures of '{key}' ship with Draft")
+    return RealRobot(
+        key=key,
+        twin=twin,
+        policy="" if source is None else source.name,
+        maker=arms["maker"],
+        predicted=arms["predicted"],
+        verdicts=tuple(verdicts(key, members["predicted"].leg_length, arms["predicted"])),
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _policy(policy: str | Path | None, twin: Comparison, notes: list[str]) -> Source | None:
+    """The policy, if it drives the robot; a note says why not."""
+    source = open_source(policy, blind=True)
+    try:
+        source.match(predicted(twin))
+    except DraftError as error:
+        if policy is not None:
+            raise
+        notes.append(f"not measured by roll-outs: {error.problems[0].cause}")
+        return None
+    return source
+
+
+def _surveyed(key: str) -> bool:
+    return any(row.robot == key for row in read())
