@@ -76,3 +76,21 @@ def torque_for(seconds: float, fold: float = 1.0) -> float:
     law, stall = limits().stalled, limits().stall_share.coefficient
     excess = power(divide(seconds, fold * law.coefficient), 1.0 / law.exponent)
     return float(stall * sqrt(1.0 + excess))
+
+
+def turning_time(share: float) -> float:
+    """Time that a turning actuator holds a torque [s]; inf for one that it holds without end.
+
+    90 % of modules held out are within a factor of `limits().rotating.band(0.9)` of it.
+
+    Args:
+        share: root mean square torque over rated torque [1].
+    """
+    law, excess = limits().rotating, share * share - 1.0
+    return law.coefficient * float(power(excess, law.exponent)) if excess > 0 else float("inf")
+
+
+def turning_torque(seconds: float) -> float:
+    """Torque over rated torque that a turning actuator holds for a time [1]."""
+    law = limits().rotating
+    return float(sqrt(1.0 + power(divide(seconds, law.coefficient), 1.0 / law.exponent)))

@@ -69,6 +69,14 @@ CAPABILITIES = {
         "m/s", "top speed", "Largest median speed at which 80 % stay up.", _SKILL, ranked=True,
         formula="max over six commands of median |v_x|, over the last 2 s of 6 s",
     ),
+    "sustained_speed": Capability(
+        "m/s", "sustained speed", "Largest speed that the motors hold for half an hour.", _SKILL,
+        formula="speed at which the worst joint's RMS torque is 1.15 of its rated one",
+    ),
+    "hold_time": Capability(
+        "s", "held for", "Time that the motors hold the top speed, by their overload law.",
+        _SKILL,
+    ),
     "step": Capability(
         "m", "step", "Tallest step that half traverse, upwards and downwards.", _SKILL, ranked=True
     ),
@@ -103,8 +111,8 @@ CAPABILITIES = {
         _ENERGY, better="less",
         formula="P / (m g v), P = sum of max(tau w, 0) + tau^2 w_NL / tau_stall",
     ),
-    "endurance": Capability("h", "lasts", "Time that the battery lasts, at top speed.", _ENERGY),
-    "range": Capability("m", "range", "Distance that the battery lasts, at top speed.", _ENERGY),
+    "endurance": Capability("h", "lasts", "Time that the battery lasts, at the sustained speed.", _ENERGY),
+    "range": Capability("m", "range", "Distance that the battery lasts, at the sustained speed.", _ENERGY),
     "peak_command": Capability(
         "m/s", "peak command", "Command at which the top speed is reached.", better=""
     ),

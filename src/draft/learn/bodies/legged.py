@@ -19,6 +19,7 @@ from draft.design import Design
 from draft.design.battery import battery
 from draft.design.legs import legs
 from draft.errors import DraftError
+from draft.laws.actuators import laws
 from draft.laws.torque_speed import stall_torque
 from draft.learn.bodies.topology import foot_of, mirrored_joints, mirrored_legs, topology, upper_of
 from draft.metrics.speed import top_speed
@@ -63,6 +64,7 @@ class LeggedRobot:
             a corner.
         battery: energy of a stated battery, and the ends of its 90 % band [Wh]; () if the design
             states none.
+        rated_torque: rated torque of each joint [N m]; () if all are those of the trend.
         electronics: stated power of computers, sensors and idle drives [W]; () if the design states
             none.
     """
@@ -90,6 +92,7 @@ class LeggedRobot:
     corner_speed: tuple[float, ...] = ()
     battery: tuple[float, ...] = ()
     electronics: tuple[float, ...] = ()
+    rated_torque: tuple[float, ...] = ()
 
     @property
     def xml(self) -> str:
@@ -157,7 +160,7 @@ class LeggedRobot:
 
 
 # Defaults of the fields that were added later: older records lack them.
-_LATER: dict[str, Any] = {"corner_speed": (), "battery": (), "electronics": ()}
+_LATER: dict[str, Any] = {"corner_speed": (), "battery": (), "electronics": (), "rated_torque": ()}
 
 
 def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
@@ -207,12 +210,28 @@ def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
         corner_speed=corners(_of_actuators(design, "corner_speed")),
         battery=tuple(map(scalar, stated_battery(design))),
         electronics=tuple(map(scalar, stated_electronics(design))),
+        rated_torque=known_ratings(
+            _of_actuators(design, "rated_torque"), _of_actuators(design, "peak_torque")
+        ),
     )
 
 
 def corners(speeds: tuple[float, ...]) -> tuple[float, ...]:
     """Corner speed of each joint [rad/s]; () if all are zero."""
     return speeds if any(speeds) else ()
+
+
+def known_ratings(rated: tuple[float, ...], peak: tuple[float, ...]) -> tuple[float, ...]:
+    """Rated torque of each joint [N m]; () if all are those of the trend for their peak torques."""
+    by_trend = usual_ratings(peak)
+    alike = all(math.isclose(*pair, rel_tol=1e-6) for pair in zip(rated, by_trend, strict=True))
+    return () if alike else rated
+
+
+def usual_ratings(peak: tuple[float, ...]) -> tuple[float, ...]:
+    """Rated torques that the shipped trend gives for peak torques [N m]."""
+    law = laws().law("rated_torque")
+    return tuple(float(law(torque)) for torque in peak)
 
 
 def stated_battery(design: Design) -> tuple[Value, ...]:

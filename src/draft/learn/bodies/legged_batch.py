@@ -20,6 +20,7 @@ from draft.errors import DraftError
 from draft.learn.bodies.legged import (
     LeggedRobot,
     corners,
+    known_ratings,
     legged_robot,
     lowest_point,
     radius_of_foot,
@@ -93,6 +94,14 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
         "no_load_speed": _tuples(_table(design, [m.no_load_speed for m in motors])[rows]),
         "battery": _stated(design, stated_battery(design), rows),
         "electronics": _stated(design, stated_electronics(design), rows),
+        "rated_torque": [
+            known_ratings(*pair)
+            for pair in zip(
+                _tuples(_table(design, [m.rated_torque for m in motors])[rows]),
+                _tuples(_table(design, [m.peak_torque for m in motors])[rows]),
+                strict=True,
+            )
+        ],
         "leg_length": _column(design, maximum(*(leg.length for leg in legs(design))), rows),
         "foot_radius": _foot_radii(batch, first),
         "height": _heights(batch, first, home[rows]),

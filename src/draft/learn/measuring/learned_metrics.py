@@ -23,6 +23,7 @@ from draft.learn.bodies.legged import LeggedRobot, check_family, legged_robot
 from draft.learn.bodies.legged_batch import legged_robots
 from draft.learn.measuring.energy import add_energy
 from draft.learn.measuring.evaluation import setting
+from draft.learn.measuring.heating import add_heat
 from draft.learn.measuring.levels import PUSH, SKILL_TESTS, SPEED, SkillTest
 from draft.learn.measuring.policies import Source
 from draft.learn.measuring.scalars import Worlds, curves, scalars
@@ -51,6 +52,7 @@ class Learned:
         top_speed: largest median speed at which 80 % stay up [m/s], shape (N,).
         top_speed_error: half of the 90 % interval of the mean speed at that command [m/s], shape
             (N,); NaN for one replica.
+        sustained_speed: largest speed that the motors hold for half an hour [m/s], shape (N,).
         kick: kick from which half recover [m/s], shape (N,); the largest level if more do.
         cost_of_transport: electrical power per weight and speed, at top speed, shape (N,); see
             `draft.learn.measuring.energy`.
@@ -61,6 +63,7 @@ class Learned:
 
     top_speed: Array
     top_speed_error: Array
+    sustained_speed: Array
     kick: Array
     cost_of_transport: Array
     limiting: tuple[str, ...]
@@ -263,6 +266,7 @@ def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
     own = worlds.of(worlds.member == member.name)
     by_test = curves(own)
     add_energy(by_test, member)
+    add_heat(by_test, histograms, member)
     values = scalars(by_test, member.leg_length).values
     level, error = values["peak_command"], math.nan
     if level is not None:

@@ -18,6 +18,7 @@ from draft.extras import need
 from draft.files import new_folder, write
 from draft.learn.measuring.energy import add_energy, supply_record
 from draft.learn.measuring.evaluation_options import Extras, Options
+from draft.learn.measuring.heating import add_heat
 from draft.learn.measuring.levels import SkillTest, flags, settle
 from draft.learn.measuring.scalars import Worlds, curves, scalars
 from draft.learn.measuring.summary import ARMS, FORMAT, Request, Summary, parse
@@ -178,6 +179,7 @@ def _of_member(
     """Numbers of one design, as `Measured` takes them; adds to the flags."""
     of_member = curves(worlds.of(worlds.member == member.name), request.regeneration)
     add_energy(of_member, member, request.payload)
+    add_heat(of_member, histograms, member)
     capabilities = scalars(of_member, member.leg_length)
     notes += capabilities.flags
     return {

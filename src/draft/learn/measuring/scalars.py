@@ -13,10 +13,13 @@ from typing import Required
 import numpy as np
 from typing_extensions import TypedDict  # pydantic cannot read that of typing before 3.12
 
+from draft.laws.limits import turning_time, turning_torque
 from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SPEED, WALK
 from draft.metrics.capabilities import CAPABILITIES
 
 SURVIVAL = 0.8  # Share that must not fall at a speed for it to count.
+HALF_HOUR = 1800.0  # Time for which a speed has to be held to count as sustained [s].
+LONGEST = 1e5  # Longest time that is told apart from no limit [s].
 HALF = 0.5  # Share that must recover from a kick, or traverse a step.
 
 
@@ -30,6 +33,7 @@ class Curve(TypedDict, total=False):
         eta: median efficiency.
         power: median electrical power [W].
         cost_of_transport, endurance, range: see `energy.add_energy`; of one design.
+        rms_rated: see `heating.add_heat`; of one design.
         traversed: share that traversed the step, for stairs.
         recovered: share that recovered from the kicks, for push.
     """
@@ -42,6 +46,7 @@ class Curve(TypedDict, total=False):
     cost_of_transport: list[float | None]
     endurance: list[float | None]
     range: list[float | None]
+    rms_rated: list[float | None]
     traversed: list[float]
     recovered: list[float]
 
@@ -248,7 +253,44 @@ def _speed(result: Scalars, curve: Curve) -> None:
     result.put("peak_command", best[1] if best else None, why)
     eta = curve["eta"][curve["levels"].index(best[1])] if best else None
     result.put("eta", eta, why if best is None else "no joint does work or gives off heat")
-    _energy(result, curve, curve["levels"].index(best[1]) if best else None, why)
+    place = curve["levels"].index(best[1]) if best else None
+    if "rms_rated" in curve:
+        held = sustained_speed(curve, turning_torque(HALF_HOUR))
+        cause = why if best is None else "its motors overheat at every speed"
+        result.put("sustained_speed", held[0] if held else None, cause)
+        rms = None if place is None else curve["rms_rated"][place]
+        result.put("hold_time", None if rms is None else min(turning_time(rms), LONGEST), why)
+        _energy(result, curve, held[1] if held else None, cause, names=("endurance", "range"))
+        _energy(result, curve, place, why, names=("cost_of_transport",))
+    else:
+        _energy(result, curve, place, why)
+
+
+def sustained_speed(curve: Curve, most: float) -> tuple[float, int] | None:
+    """Largest speed whose torques can be held, and its level's place; None if there is none.
+
+    Between the last level that can be held and the next it is interpolated.
+
+    Args:
+        curve: curve of commanded speeds, with `rms_rated`.
+        most: root mean square torque over the rated one that can be held.
+    """
+    rows = [
+        (i, speed, rms)
+        for i, (share, speed, rms) in enumerate(
+            zip(curve["survival"], curve["speed"], curve.get("rms_rated", []), strict=False)
+        )
+        if share >= SURVIVAL and speed is not None and rms is not None
+    ]
+    held = [row for row in rows if row[2] <= most]
+    if not held:
+        return None
+    place, best, rms = max(held, key=lambda row: row[1])
+    after = [row for row in rows if row[0] > place and row[2] > most and row[1] > best]
+    if after:
+        _, faster, more = after[0]
+        best += (most - rms) / (more - rms) * (faster - best)
+    return best, place
 
 
 def _walk(result: Scalars, curve: Curve) -> None:
@@ -258,15 +300,23 @@ def _walk(result: Scalars, curve: Curve) -> None:
     _energy(result, curve, None if fell else 0, "all fell", "walk_")
 
 
-def _energy(result: Scalars, curve: Curve, place: int | None, why: str, prefix: str = "") -> None:
+def _energy(
+    result: Scalars,
+    curve: Curve,
+    place: int | None,
+    why: str,
+    prefix: str = "",
+    names: Sequence[str] = ("cost_of_transport", "endurance", "range"),
+) -> None:
     """Add cost of transport, endurance and range at a level of a curve that has them."""
     reason = why if place is None else "it does not move forwards, or uses no power"
-    columns = (
-        ("cost_of_transport", curve.get("cost_of_transport")),
-        ("endurance", curve.get("endurance")),
-        ("range", curve.get("range")),
-    )
-    for name, values in columns:
+    columns = {
+        "cost_of_transport": curve.get("cost_of_transport"),
+        "endurance": curve.get("endurance"),
+        "range": curve.get("range"),
+    }
+    for name in names:
+        values = columns[name]
         if values is not None:
             result.put(prefix + name, None if place is None else values[place], reason)
 
