@@ -111,8 +111,12 @@ CAPABILITIES = {
         _ENERGY, better="less",
         formula="P / (m g v), P = sum of max(tau w, 0) + tau^2 w_NL / tau_stall",
     ),
-    "endurance": Capability("h", "lasts", "Time that the battery lasts, at the sustained speed.", _ENERGY),
-    "range": Capability("m", "range", "Distance that the battery lasts, at the sustained speed.", _ENERGY),
+    "endurance": Capability(
+        "h", "lasts", "Time that the battery lasts, at the sustained speed.", _ENERGY
+    ),
+    "range": Capability(
+        "m", "range", "Distance that the battery lasts, at the sustained speed.", _ENERGY
+    ),
     "peak_command": Capability(
         "m/s", "peak command", "Command at which the top speed is reached.", better=""
     ),
