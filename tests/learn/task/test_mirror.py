@@ -108,26 +108,19 @@ def of_terms(env: Any, group: str, values: torch.Tensor) -> dict[str, torch.Tens
     return dict(zip(manager.active_terms[group], values.split(widths, dim=-1), strict=True))
 
 
-@pytest.mark.parametrize("group", ["actor", "critic"])
 def test_the_mirrored_robot_sees_the_mirror_image_of_what_the_robot_sees(
-    env: Any, cheetah: LeggedRobot, group: str
-) -> None:
-    seen = walk_mirrored(env, cheetah, 12)[group]
-    expected = of_terms(env, group, mirror.flips(env)[group](seen[0]))
-    for name, value in of_terms(env, group, seen[1]).items():
-        torch.testing.assert_close(value, expected[name], atol=2e-3, rtol=2e-3, msg=name)
-
-
-def test_the_robot_of_that_test_touches_the_ground_and_is_not_symmetric_itself(
     env: Any, cheetah: LeggedRobot
 ) -> None:
-    seen = walk_mirrored(env, cheetah, 12)["critic"]
-    terms = of_terms(env, "critic", seen[0])
-    assert 0 < terms["foot_contact"].sum() < 4
-    same = {"height_scan", "design"}  # Flat ground looks alike from both sides.
-    other = of_terms(env, "critic", seen[1])
-    for name in terms.keys() - same:
-        assert (terms[name] - other[name]).abs().max() > 0.004, name
+    seen = walk_mirrored(env, cheetah, 12)
+    for group, (one, other) in seen.items():
+        expected = of_terms(env, group, mirror.flips(env)[group](one))
+        for name, value in of_terms(env, group, other).items():
+            torch.testing.assert_close(value, expected[name], atol=2e-3, rtol=2e-3, msg=name)
+    # It touches the ground, and is not symmetric itself; flat ground looks alike from both sides.
+    here, there = (of_terms(env, "critic", one) for one in seen["critic"])
+    assert 0 < here["foot_contact"].sum() < 4
+    for name in here.keys() - {"height_scan", "design"}:
+        assert (here[name] - there[name]).abs().max() > 0.004, name
 
 
 def test_the_scan_of_mirrored_ground_is_mirrored(
@@ -160,29 +153,20 @@ def test_an_image_of_an_image_is_what_it_was(env: Any) -> None:
         assert not torch.equal(flip(values), values)
 
 
-def test_an_unknown_observation_is_refused(env: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    terms = env.observation_manager.active_terms
-    names = ["smell" if name == "design" else name for name in terms["actor"]]
-    monkeypatch.setitem(terms, "actor", names)
-    with pytest.raises(DraftError, match=r"(?s)observation 'smell' is not known.*learning\.mirror"):
-        mirror.flips(env)
-
-
-def test_an_observation_of_another_width_is_refused(
-    env: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    widths = env.observation_manager.group_obs_term_dim
-    monkeypatch.setitem(widths, "actor", [(6,), *widths["actor"][1:]])
-    with pytest.raises(DraftError, match=r"'base_lin_vel'.*shape \(6,\), not \(3,\)"):
-        mirror.flips(env)
-
-
-def test_a_family_whose_joints_mirror_differently_is_refused(
+def test_what_has_no_known_image_is_refused(
     env: Any, cheetah: LeggedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    other = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))
-    monkeypatch.setattr(env.scene["robot"].cfg, "members", (cheetah, other))
-    with pytest.raises(
-        DraftError, match="joints of odd mirror differently from those of quadruped"
-    ):
-        mirror.flips(env)
+    manager, robot = env.observation_manager, env.scene["robot"].cfg
+    terms, widths = manager.active_terms, manager.group_obs_term_dim
+    smell = ["smell" if name == "design" else name for name in terms["actor"]]
+    odd = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))
+    wide = [(6,), *widths["actor"][1:]]
+    for words, patch in {
+        r"(?s)observation 'smell' is not known.*learning\.mirror": (terms, "actor", smell),
+        r"'base_lin_vel'.*shape \(6,\), not \(3,\)": (widths, "actor", wide),
+        "of odd mirror differently from those of quad": (vars(robot), "members", (cheetah, odd)),
+    }.items():
+        with monkeypatch.context() as patched:
+            patched.setitem(*patch)
+            with pytest.raises(DraftError, match=words):
+                mirror.flips(env)
