@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -12,14 +11,17 @@ pytest.importorskip("mjlab")
 
 import torch
 from mjlab.envs import ManagerBasedRlEnv
+from mjlab.utils.lab_api.math import quat_from_euler_xyz
 
-import draft
 from draft.errors import DraftError
-from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.task.mdp.commands import command_term
 from draft.learn.task.mdp.environment import environment
 from draft.learn.task.world import mirror
 from draft.learn.task.world.access import GROUND
 from draft.learn.task.world.task import Task
+from tests.learn.small import member
+from tests.learn.task.states import place
 
 POLAR = (1.0, -1.0, 1.0)
 AXIAL = (-1.0, 1.0, -1.0)
@@ -27,7 +29,7 @@ AXIAL = (-1.0, 1.0, -1.0)
 
 @pytest.fixture(scope="module")
 def cheetah() -> LeggedRobot:
-    return legged_robot(draft.load("quadruped").resolve("cheetah"))
+    return member()
 
 
 @pytest.fixture(scope="module")
@@ -42,25 +44,21 @@ def env(cheetah: LeggedRobot) -> Any:
 def start_mirrored(env: Any, member: LeggedRobot) -> None:
     """Put the first world in a state without symmetry, and the second in its mirror image."""
     env.reset()
-    state, index = env.sim.data, env.scene["robot"].indexing
     torch.manual_seed(4)
-    roll, pitch, yaw = 0.12, -0.09, 0.4
-    position, velocity = torch.tensor([0.3, 0.7, member.height + 0.005]), torch.randn(6) * 0.4
-    q, qd = torch.tensor(member.home) + 0.1 * torch.randn(12), torch.randn(12)
-    for world, sign in ((0, 1.0), (1, -1.0)):
-        quaternion = quaternion_of(sign * roll, pitch, sign * yaw)
-        linear, angular = velocity[:3].clone(), velocity[3:].clone()
-        at, joints, speeds = position.clone(), q, qd
-        if world == 1:
-            at *= torch.tensor(POLAR)
-            linear *= torch.tensor(POLAR)
-            angular *= torch.tensor(AXIAL)
-            joints, speeds = other_side(q, member), other_side(qd, member)
-        state.qpos[world, index.free_joint_q_adr] = torch.cat((at, quaternion))
-        state.qvel[world, index.free_joint_v_adr] = torch.cat((linear, angular))
-        state.qpos[world, index.joint_q_adr] = joints
-        state.qvel[world, index.joint_v_adr] = speeds
-    command = env.command_manager.get_term("twist")
+    polar, axial = torch.tensor([[1.0] * 3, POLAR]), torch.tensor([[1.0] * 3, AXIAL])
+    linear, angular = torch.randn(2, 3) * 0.4
+    joints, speeds = torch.tensor(member.home) + 0.1 * torch.randn(12), torch.randn(12)
+    turned = torch.tensor([0.12, -0.09, 0.4]) * axial
+    place(
+        env,
+        torch.tensor([0.3, 0.7, member.height + 0.005]) * polar,
+        quat_from_euler_xyz(*turned.unbind(1)),
+        linear * polar,
+        angular * axial,
+        torch.stack((joints, other_side(joints, member))),
+        torch.stack((speeds, other_side(speeds, member))),
+    )
+    command = command_term(env)
     command.vel_command_b[:] = torch.tensor([[0.6, 0.3, -0.2], [0.6, -0.3, 0.2]])
     command.is_heading_env[:] = False
     command.is_standing_env[:] = False
@@ -75,19 +73,6 @@ def other_side(values: torch.Tensor, member: LeggedRobot) -> torch.Tensor:
         twin = member.joints.index("".join((name[0], other[name[1]], name[2:])))
         found[twin] = -values[i] if name.endswith("roll") else values[i]
     return found
-
-
-def quaternion_of(roll: float, pitch: float, yaw: float) -> torch.Tensor:
-    """Quaternion of turns about z, then y, then x."""
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in (roll, pitch, yaw))
-    return torch.tensor(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )
 
 
 def walk_mirrored(env: Any, member: LeggedRobot, steps: int) -> dict[str, torch.Tensor]:
