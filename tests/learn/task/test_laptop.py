@@ -66,7 +66,7 @@ def test_the_fastest_command_grows_where_fast_ones_are_tracked_and_shrinks_where
     missed: float | None,
     change: float,
 ) -> None:
-    term = command_term(running)
+    term: Any = command_term(running)
     if missed is not None:
         monkeypatch.setattr(term.cfg, "growth", term.cfg.growth._replace(missed=missed))
     for one in (term._reached, term._since):
@@ -78,7 +78,7 @@ def test_the_fastest_command_grows_where_fast_ones_are_tracked_and_shrinks_where
 
 
 def test_a_reset_of_some_robots_is_no_sample(running: Any) -> None:
-    term = command_term(running)
+    term: Any = command_term(running)
     term._since.zero_()
     term._update_command(torch.arange(2))
     assert not term._since.any()
@@ -89,7 +89,7 @@ def test_a_reset_of_some_robots_is_no_sample(running: Any) -> None:
 def test_each_group_of_worlds_grows_by_what_it_tracks_itself(
     running: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    term = command_term(running)
+    term: Any = command_term(running)
     before, group = term.group, torch.arange(WORLDS) % 2
     term.divide(group, 2)
     term._since.zero_()
@@ -101,7 +101,7 @@ def test_each_group_of_worlds_grows_by_what_it_tracks_itself(
 def test_commands_begin_with_the_range_of_the_base_stage_and_end_below_that_of_the_stage(
     running: Any,
 ) -> None:
-    term = command_term(running)
+    term: Any = command_term(running)
     term.grown.zero_()
     assert term.range_now()[0, 0] == pytest.approx(1.0)
     term.grown.fill_(1000.0)
@@ -110,7 +110,7 @@ def test_commands_begin_with_the_range_of_the_base_stage_and_end_below_that_of_t
 
 
 def test_most_robots_are_led_straight_away_along_their_heading(climbing: Any) -> None:
-    term = command_term(climbing)
+    term: Any = command_term(climbing)
     yaw = torch.linspace(-3.0, 3.0, WORLDS)
     none = torch.zeros(WORLDS)
     place(climbing, quat=torch.stack(((yaw / 2).cos(), none, none, (yaw / 2).sin()), dim=1))

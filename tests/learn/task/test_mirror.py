@@ -11,7 +11,7 @@ pytest.importorskip("mjlab")
 
 import torch
 from mjlab.envs import ManagerBasedRlEnv
-from mjlab.utils.lab_api.math import quat_from_euler_xyz
+from mjlab.utils.lab_api.math import quat_apply, quat_from_euler_xyz
 
 from draft.errors import DraftError
 from draft.learn.bodies.legged import LeggedRobot
@@ -48,13 +48,13 @@ def start_mirrored(env: Any, member: LeggedRobot) -> None:
     polar, axial = torch.tensor([[1.0] * 3, POLAR]), torch.tensor([[1.0] * 3, AXIAL])
     linear, angular = torch.randn(2, 3) * 0.4
     joints, speeds = torch.tensor(member.home) + 0.1 * torch.randn(12), torch.randn(12)
-    turned = torch.tensor([0.12, -0.09, 0.4]) * axial
+    quat = quat_from_euler_xyz(*(torch.tensor([0.12, -0.09, 0.4]) * axial).unbind(1))
     place(
         env,
         torch.tensor([0.3, 0.7, member.height + 0.005]) * polar,
-        quat_from_euler_xyz(*turned.unbind(1)),
+        quat,
         linear * polar,
-        angular * axial,
+        quat_apply(quat, angular * axial),
         torch.stack((joints, other_side(joints, member))),
         torch.stack((speeds, other_side(speeds, member))),
     )

@@ -33,7 +33,7 @@ def test_the_share_is_spread_evenly(share: float) -> None:
 
 
 def test_their_commands_are_those_of_stage_push_and_do_not_grow(mixed: Any) -> None:
-    term = command_term(mixed)
+    term: Any = command_term(mixed)
     assert term.pushed.tolist() == [False, False, False, True] * 2
     slow, others = term.range_now()[term.pushed], term.range_now()[~term.pushed]
     torch.testing.assert_close(slow, torch.tensor([1.0, 0.6, 0.5]).expand(2, 3))
@@ -44,7 +44,7 @@ def test_their_commands_are_those_of_stage_push_and_do_not_grow(mixed: Any) -> N
 def test_their_tracking_says_nothing_of_how_fast_the_others_run(
     mixed: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    term = command_term(mixed)
+    term: Any = command_term(mixed)
     before, most = term.grown.clone(), term.range_now()[:, 0]
     # With those that are pushed, 0.8 of the commands would be reached, and then not.
     drive(mixed, monkeypatch, most, most * torch.where(term.pushed, 1.0, 0.79), 4.0)
@@ -66,7 +66,7 @@ def test_their_pushes_are_those_of_stage_push_and_alike_for_all_designs(
     term.time_left[:] = mixed.step_dt
     term(mixed, None, **cfg.params)
     mixed.common_step_counter = 0
-    pushed = command_term(mixed).pushed
+    pushed: Any = command_term(mixed).pushed
     strong = factor * torch.tensor([0.5, 0.5, 0.4, 0.52, 0.52, 0.78])
     torch.testing.assert_close(added[0][pushed], strong.expand(2, 6))
     roots = mixed.scene["robot"].leg_scale.sqrt()
