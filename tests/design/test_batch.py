@@ -154,6 +154,7 @@ BENT = {
 rows = st.fixed_dictionaries({k: st.one_of(st.floats(*v), st.just(v[0])) for k, v in BENT.items()})
 
 
+@pytest.mark.slow
 @given(st.lists(rows, min_size=1, max_size=5), st.sets(st.sampled_from(sorted(BENT)), min_size=1))
 def test_canted_axes_and_rotated_links_of_many_are_those_of_each(
     drawn: list[dict[str, float]], varied: set[str]
@@ -255,6 +256,7 @@ def test_what_is_no_number_is_an_error_in_python_too(values: Any, cause: str) ->
     assert caught.value.problems[0].cause == cause
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(tables())
 def test_an_indexed_design_is_the_design_resolved_alone(
