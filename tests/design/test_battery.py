@@ -88,22 +88,6 @@ def test_the_report_tells_the_energy_its_band_and_its_source() -> None:
     assert "legged_batteries.csv" in record["source"]
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("{}", "neither 'energy' nor 'mass'"),
-        ("{energy: -5}", "must be above zero"),
-        ("{energy: trunk_lenght}", "unknown name 'trunk_lenght'"),
-    ],
-)
-def test_a_battery_that_cannot_be_is_refused_at_its_line(
-    tmp_path: Path, text: str, words: str
-) -> None:
-    with pytest.raises(draft.DraftError, match=words) as caught:
-        with_battery(tmp_path, text).resolve()
-    assert "parameters.yaml:" in str(caught.value)
-
-
 def test_standing_lasts_until_the_battery_is_spent_on_heat(tmp_path: Path) -> None:
     design = with_battery(tmp_path, "{energy: 500}").resolve()
     found = of_design(design, ["endurance_standing", "cost_of_standing"])

@@ -196,37 +196,6 @@ def test_a_class_states_it_in_its_file_and_expressions_read_it(tmp_path: Path) -
     assert design_file(spec.resolve({KEY: None}))["values"][KEY] is None
 
 
-@pytest.mark.parametrize("corner", [20.0, 25.0])
-def test_a_corner_at_or_above_the_no_load_speed_is_refused(tmp_path: Path, corner: float) -> None:
-    folder = write_robot(tmp_path / "robot")
-    file = folder / "parameters.yaml"
-    text = file.read_text(encoding="utf-8")
-    written = text.replace("gear_ratio: 15", f"gear_ratio: 15\n    corner_speed: {corner}")
-    file.write_text(written, encoding="utf-8")
-    line = 1 + written.split("\n").index(f"    corner_speed: {corner}")
-    with pytest.raises(draft.DraftError) as caught:
-        draft.load(folder).resolve()
-    (problem,) = caught.value.problems
-    assert f"corner speed at {corner:g} rad/s, and its no-load speed is 20" in problem.cause
-    assert problem.where is not None
-    assert problem.where.line == line
-    assert "state a lower one, 'trend'" in problem.remedy
-    many = QUADRUPED.resolve({KEY: np.array([5.0, 400.0])})
-    assert list(np.asarray(many.accepted)) == [True, False]
-
-
-@pytest.mark.parametrize(("quantity", "word"), [("corner_speed", "trends"), ("mass", "trend")])
-def test_the_word_trend_is_explained_where_it_is_no_value(quantity: str, word: str) -> None:
-    with pytest.raises(draft.DraftError, match=f"unknown name '{word}'") as caught:
-        QUADRUPED.resolve({f"actuators.leg.{quantity}": word})
-    assert "only corner_speed takes the word 'trend'; " in caught.value.problems[0].remedy
-
-
-def test_a_negative_corner_is_refused() -> None:
-    with pytest.raises(draft.DraftError, match="corner_speed is -1: it must not be negative"):
-        QUADRUPED.resolve({KEY: -1})
-
-
 def test_torque_or_speed_cannot_follow_from_the_power_of_a_motor_with_a_corner() -> None:
     stated = {"peak_torque": 60.0, "peak_power": 300.0, "corner_speed": 5.0}
     with pytest.raises(draft.DraftError, match="its torque or speed would follow from peak_power"):

@@ -327,15 +327,6 @@ def test_an_error_that_is_not_the_allowed_one_refuses(allow: list[str]) -> None:
         design.build()
 
 
-@pytest.mark.parametrize("item", ["torq", "not_physical", "torq:leg"])
-def test_allowing_what_is_no_finding_is_an_error_with_its_place(item: str) -> None:
-    with pytest.raises(draft.ResolveError, match="'allow' names no finding") as error:
-        robot(allow=[item]).resolve()
-    where: Any = error.value.problems[0].where
-    assert where.file.endswith("parameters.yaml")
-    assert where.line is not None
-
-
 def test_only_errors_have_a_remedy_and_every_kind_is_explained() -> None:
     assert set(KINDS) >= ERRORS
     _, finding = _torque()

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 import draft
 from draft import geometry as g
 from draft.cli import main
-from draft.errors import ResolveError, SpecError
 from tests.helpers import ids, leg, parameter, robot
 from tests.written import edit, write_robot
 
@@ -141,23 +140,6 @@ def test_one_side_may_slide_the_other_way_over_a_range_of_its_own() -> None:
     model = sides("y", change).resolve().build().mujoco
     assert model.joint("R_piston").axis == pytest.approx(-model.joint("L_piston").axis)
     assert model.joint("R_piston").range == pytest.approx([0, 0.2])
-
-
-def test_an_actuator_of_a_slide_is_an_error_with_its_line(tmp_path: Path) -> None:
-    path = write_robot(tmp_path / "robot")
-    edit(path, "tree.yaml", HINGE, PISTON.replace("}", ", actuator: leg}"))
-    with pytest.raises(SpecError) as caught:
-        draft.load(path)
-    (problem,) = caught.value.problems
-    assert problem.cause == "joint 'piston' is a slide, and 'leg' is a rotary actuator class"
-    assert problem.where is not None
-    assert problem.where.line == 11
-    assert problem.remedy.startswith("remove 'actuator'")
-
-
-def test_a_home_outside_the_stroke_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(ResolveError, match=r"home position of piston is 0\.2: it must lie in the"):
-        robot(telescope(home=0.2)).resolve()
 
 
 def test_show_gives_the_stroke_in_metres(
