@@ -126,15 +126,6 @@ def test_corners_of_parts_are_those_of_the_table_at_the_speed_of_the_catalogue()
             assert part.corner_speed == float(row["corner_speed_rad_s"])
 
 
-def test_n_designs_have_the_numbers_of_each() -> None:
-    corners = np.array([0.0, 5.0, 22.0, 39.0])
-    many = of_design(QUADRUPED.resolve("cheetah", {KEY: corners, "payload": 20.0}))
-    for i, corner in enumerate(corners.tolist()):
-        one = of_design(QUADRUPED.resolve("cheetah", {KEY: corner, "payload": 20.0}))
-        for name, value in one.items():
-            assert np.asarray(many[name])[i] == pytest.approx(value, rel=1e-12), name
-
-
 @given(st.floats(0.5, 38.0))
 def test_a_later_corner_jumps_higher_stands_cooler_and_runs_no_slower(corner: float) -> None:
     values = {KEY: np.array([0.0, corner, corner + 1]), "payload": 60.0}

@@ -98,18 +98,6 @@ def test_the_command_metrics_knows_the_load(capsys: pytest.CaptureFixture[str]) 
     assert loaded["top_speed"] < bare["top_speed"]
 
 
-def test_many_payloads_are_each_of_them_alone() -> None:
-    loads = np.array([0.0, 2.0, 50.0])
-    many = QUADRUPED.resolve("bear", {"payload": loads})
-    together = of_design(many, KNOWS)
-    for i, mass in enumerate(loads):
-        alone = of_design(QUADRUPED.resolve("bear", {"payload": float(mass)}), KNOWS)
-        again = of_design(many[i], KNOWS)
-        for name in KNOWS:
-            assert np.asarray(together[name])[i] == pytest.approx(alone[name]), name
-            assert again[name] == alone[name]
-
-
 def test_no_payload_leaves_every_metric_as_it_was() -> None:
     bare = of_design(QUADRUPED.resolve("cheetah"))
     empty = of_design(QUADRUPED.resolve("cheetah", {"payload": 0}))
