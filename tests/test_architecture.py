@@ -361,7 +361,7 @@ def _forbidden(tree: ast.AST) -> list[int]:
         elif isinstance(node, ast.keyword) and node.arg == "shell":
             bad = ast.unparse(node.value) != "False"
         if bad:
-            found.append(node.lineno)
+            found.append(getattr(node, "lineno", 0))
     return found
 
 

@@ -381,9 +381,14 @@ WORDS = {
     "set_of_a_negative_corner": asked("--set", "actuators.leg.corner_speed=-1"),
     "set_to_a_misspelt_trend": asked("--set", "actuators.leg.corner_speed=trends"),
     "set_to_a_trend_that_is_none": asked("--set", "actuators.leg.mass=trend"),
-    "set_of_a_rated_torque_above_the_peak": asked("--set", "actuators.leg.rated_torque=80"),
-    "set_of_radius_length_and_shape": asked(
-        "--set", *(f"actuators.leg.{of}" for of in ("radius=0.05", "length=0.05", "aspect_ratio=1"))
+    "set_of_a_rated_torque_above_the_peak": Mistake(
+        arguments=("--set", "actuators.leg.rated_torque=80")
+    ),
+    "set_of_radius_length_and_shape": Mistake(
+        arguments=(
+            "--set",
+            *(f"actuators.leg.{of}" for of in ("radius=0.05", "length=0.05", "aspect_ratio=1")),
+        )
     ),
     "set_of_a_negative_payload": asked("--set", "payload=-1"),
     "payload_twice": asked("--payload", "10", "--set", "payload=5"),

@@ -15,7 +15,7 @@ QUADRUPED = draft.load("quadruped")
 
 def with_battery(text: str, density: str = "population") -> draft.Spec:
     """The shipped quadruped with a battery in its parameters.yaml."""
-    files = {name: file.read_text(encoding="utf-8") for name, file in QUADRUPED.files.items()}
+    files = {name: file.read_bytes().decode() for name, file in QUADRUPED.files.items()}
     files["parameters.yaml"] += f"\nbattery: {text}\n"
     stated = files["root.yaml"].replace("density: population", f"density: {density}")
     return draft.Spec.parse(files | {"root.yaml": stated})
