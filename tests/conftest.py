@@ -45,6 +45,7 @@ SLOW = (
     "cli/test_references.py",
     "cli/test_study.py",
     "cli/test_train.py",
+    "cli/test_verdict_of_training.py",
     "explore/test_engines.py",
     "imports/test_bad_descriptions.py",
     "model/test_mujoco_log.py",

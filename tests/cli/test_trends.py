@@ -104,6 +104,7 @@ def test_a_robot_can_use_laws_refitted_with_rows_of_its_own(
     assert leg.mass != before
 
 
+@pytest.mark.slow
 def test_rows_of_ones_own_never_overwrite_the_package(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["trends", "fit", "--catalogue", _table("good")]) == 0
     assert "written to trends.json" in capsys.readouterr().out

@@ -66,6 +66,7 @@ def act(s: Session, clock: Clock, action: tuple) -> None:
         {**calls, "undo": s.undo, "redo": s.redo}[kind](*rest)
 
 
+@pytest.mark.slow
 @given(ACTIONS)
 def test_undo_after_anything_leads_back_and_redo_forth(
     tmp_path_factory: pytest.TempPathFactory, actions: list[tuple]
