@@ -18,7 +18,7 @@ from draft.study.file import Study
 from draft.study.graph import graph
 from draft.study.jobs import Group, Job, Physics, Training
 from draft.study.requests import EvaluateRequest, Request, TrainRequest
-from draft.study.store import Store
+from draft.study.store import DONE, Store
 from tests.learn.small import member
 
 TEXT = """\
@@ -141,7 +141,7 @@ class Fake:
         self._code = None
 
 
-def go(folder: Path, worker: Fake, text: str = TEXT, *names: str, **more: Any) -> Execution:
+def go(folder: Path, worker: Fake, text: str = SMALL, *names: str, **more: Any) -> Execution:
     """One call of the study."""
     opened = store(folder, text, *names)
     try:
@@ -159,6 +159,14 @@ def states(folder: Path) -> dict[str, str]:
 
 def told(folder: Path) -> dict:
     return json.loads((folder / "study.json").read_text())
+
+
+def again(folder: Path, text: str = SMALL, *names: str) -> list[str]:
+    """Jobs that one more call does, after which all are done."""
+    worker = Fake()
+    go(folder, worker, text, *names)
+    assert set(states(folder).values()) == {DONE}
+    return worker.began
 
 
 def dying(name: str, how: Callable[[Any], None]) -> Fake:
