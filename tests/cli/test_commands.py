@@ -67,7 +67,9 @@ def test_models_are_written_to_the_folder_of_the_design(
 
 
 def test_build_prints_one_json_object(command: Command) -> None:
-    told = command.json("build robot --design long")
+    said = command("build robot --design long --json")
+    assert said.err == ""
+    told = json.loads(said.out)
     assert set(told) == RECORD
     design = draft.load("robot").resolve("long")
     assert (told["name"], told["design"], told["n_joints"]) == ("monoped", "long", 2)
@@ -125,12 +127,7 @@ def test_a_part_that_was_taken_back_stays_away(robot: Path, command: Command) ->
 # --- what is on the disk already -----------------------------------------------------------
 
 
-@pytest.mark.parametrize("exchange", [True, False])
-def test_a_model_is_replaced_whole(
-    exchange: bool, command: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if not exchange:
-        monkeypatch.setattr(files, "_exchange", lambda a, b: False)
+def test_a_model_is_replaced_whole(command: Command) -> None:
     Path("model").mkdir()  # An empty folder is filled.
     texts = set()
     for words, written in (
@@ -156,40 +153,21 @@ def test_folders_with_other_files_are_kept(command: Command) -> None:
     assert files_below(Path("thesis")) == {"chapter.tex"}
 
 
-def interrupted(*_: object) -> None:
-    raise KeyboardInterrupt
-
-
-def failed(*_: object) -> None:
-    raise OSError(28, "No space left on device")
-
-
-@pytest.mark.parametrize(("fault", "code"), [(interrupted, 130), (failed, 2)])
-@pytest.mark.parametrize("step", ["_flush", "_move_folder", "1st rename", "2nd rename"])
+# tests/model/test_folder.py and tests/test_files.py interrupt it at each of its steps.
+@pytest.mark.parametrize(("fault", "code"), [(KeyboardInterrupt(), 130), (OSError(28, "full"), 2)])
+@pytest.mark.parametrize("step", ["_flush", "_move_folder"])
 def test_a_save_that_does_not_finish_leaves_the_old_model_or_nothing(
-    step: str, fault: object, code: int, command: Command, monkeypatch: pytest.MonkeyPatch
+    step: str, fault: BaseException, code: int, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    def fails(*_: object) -> None:
+        raise fault
+
     command("build robot --out model")
     before = {name: Path("model", name).read_bytes() for name in MODEL}
-    rename, calls = os.rename, []
-
-    def rename_until(source: Path, target: Path) -> None:
-        calls.append(source)
-        if len(calls) == int(step[0]):
-            fault()  # type: ignore[operator]
-        rename(source, target)
-
-    if step.startswith("_"):
-        monkeypatch.setattr(files, step, fault)
-    else:  # Where folders cannot be exchanged, the old model is put back.
-        monkeypatch.setattr(files, "_exchange", lambda a, b: False)
-        monkeypatch.setattr(files.os, "rename", rename_until)
-    command("build robot --out model --set thigh_length=0.2", code=code)
-    assert step.startswith("_") or len(calls) >= int(step[0])
+    monkeypatch.setattr(files, step, fails)
+    for out in ("model", "first"):
+        command(f"build robot --out {out} --set thigh_length=0.2", code=code)
     assert {name: Path("model", name).read_bytes() for name in MODEL} == before
-    if step != "2nd rename":
-        calls.clear()
-        command("build robot --out first", code=code)
     assert {path.name for path in Path().iterdir()} == {"robot", "model"}
 
 

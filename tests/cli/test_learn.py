@@ -90,6 +90,8 @@ def test_the_first_lines_tell_what_would_train_here(shown: Callable[..., str]) -
 
 def test_numbers_of_a_recipe_tell_its_reasons(shown: Callable[..., str]) -> None:
     out = shown()
+    assert out.count("\n") > len(Config().rows())
+    assert "s = " not in out.replace("s = L", "")  # Without a design there is one value.
     assert out.count("choice: laptop") == len(LAPTOP.changes)
     why = LAPTOP.changes["learning.environments"].why
     words = f"learning.environments 512 1 choice: laptop number of worlds; {why}"
@@ -138,13 +140,6 @@ def test_as_json_there_is_what_would_train_here(command: Command) -> None:
     assert (worlds["source"], worlds["doc"]) == ("choice: laptop", "number of worlds")
     assert worlds["why"] == LAPTOP.changes["learning.environments"].why
     assert command.json("learn show --stage push")["minutes"].keys() == {"push"}
-
-
-def test_without_a_design_there_is_one_value(shown: Callable[..., str]) -> None:
-    out = shown()
-    assert out.count("\n") > len(Config().rows())
-    assert "s = " not in out.replace("s = L", "")
-    assert "rewards.height " in out
 
 
 def test_as_json_every_number_has_its_value_at_the_designs_scale(command: Command) -> None:

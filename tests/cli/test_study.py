@@ -22,9 +22,9 @@ from draft.learn.engine.machine import Machine
 from draft.learn.training import run as runs
 from draft.learn.training.members import robots_digest
 from draft.learn.training.run import open_run
-from draft.study import capacity, placement, running
+from draft.study import placement, running
 from tests.commands import Command
-from tests.study.small import Fake
+from tests.study.small import Fake, machine_of
 
 TEXT = """\
 designs: [cheetah]
@@ -98,12 +98,7 @@ report                  2 jobs          new
 def test_on_a_cpu_a_dry_run_prints_the_hours_of_its_engine(
     command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # A machine of two cores without a GPU, where native MuJoCo can be used.
-    for place in (capacity, machine):
-        monkeypatch.setattr(place, "cores", lambda: 2)
-    monkeypatch.setattr(machine, "obstacle", lambda: None)
-    cpu = Machine(["cpu"], machine.choose("auto", ["cpu"]), None, 2)
-    monkeypatch.setattr(placement, "this_machine", lambda: cpu)
+    machine_of(2, monkeypatch)
     rates = {name: {"flat": 1e3, "uneven": 5e2} for name in ("native", "warp")}
     monkeypatch.setattr(machine, "_RATES", rates)
     Path("mine.yaml").write_text(f"recipe: laptop\n{TEXT}")

@@ -9,19 +9,14 @@ import pytest
 from draft.errors import DraftError
 from draft.learn.engine import machine
 from draft.learn.engine.machine import EngineName
-from draft.study import capacity as module
 from draft.study.capacity import on_cpu, on_gpus
 from draft.study.jobs import Physics
-from tests.study.small import TEXT, study
-
-LARGE = TEXT.replace("environments: 4", "environments: 64")
+from tests.study.small import LARGE, TEXT, machine_of, study
 
 
 @pytest.fixture(autouse=True)
 def eight_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    for place in (module, machine):
-        monkeypatch.setattr(place, "cores", lambda: 8)
-    monkeypatch.setattr(machine, "obstacle", lambda: None)
+    machine_of(8, monkeypatch)
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,6 @@ from tests.study.small import (
     dying,
     go,
     jobs,
-    request_of,
     states,
     store,
     told,
@@ -62,7 +61,7 @@ def test_all_jobs_are_done_in_order_and_then_none(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", jobs(SMALL))
 @pytest.mark.parametrize("when", ["at its start", "half way", "at its end"])
-def test_a_study_that_is_killed_resumes_and_loses_nothing(
+def test_a_study_that_is_killed_resumes_with_any_engine_and_loses_nothing(
     tmp_path: Path, name: str, when: str
 ) -> None:
     def how(request: Request) -> None:
@@ -71,26 +70,19 @@ def test_a_study_that_is_killed_resumes_and_loses_nothing(
         elif when == "half way" and isinstance(request, TrainRequest):
             half(request)
 
-    first = dying(name, how)
-    with pytest.raises(Killed):
-        go(tmp_path, first)
-    order = list(jobs(SMALL))
-    assert first.began == order[: order.index(name) + 1]
-    at = order.index(name) + (when == "at its end" and name != "report")
-    assert again(tmp_path) == order[at:]
-
-
-def test_a_study_resumes_with_another_engine(tmp_path: Path) -> None:
-    first, second = dying("bear-base-0", half), Fake()
+    first, second = dying(name, how), Fake()
     first.physics, second.physics = Physics("native", 2), Physics("warp", 1)
     with pytest.raises(Killed):
         go(tmp_path, first)
     go(tmp_path, second)
     order = list(jobs(SMALL))
-    assert second.began == order[order.index("bear-base-0") :]
-    assert first.requests["bear-base-0"].engine == "native"
-    engines = {getattr(request, "engine", None) for request in second.requests.values()}
-    assert engines == {"warp", None}
+    assert first.began == order[: order.index(name) + 1]
+    at = order.index(name) + (when == "at its end" and name != "report")
+    assert second.began == order[at:]
+    assert set(states(tmp_path).values()) == {DONE}
+    for worker in (first, second):
+        engines = {getattr(one, "engine", None) for one in worker.requests.values()}
+        assert engines <= {worker.physics.engine, None}
     assert not (tmp_path / "aside").exists()
 
 
@@ -130,14 +122,32 @@ def test_a_report_is_written_again_when_what_it_reports_on_is_repeated(tmp_path:
     assert again(tmp_path) == ["report"]
 
 
-def test_a_job_whose_process_dies_is_tried_once_more(tmp_path: Path) -> None:
-    deaths = iter([-9, None])
-    once = Fake(lambda name, _: next(deaths) if name == "bear-base-0" else None)
-    go(tmp_path / "once", once)
-    assert once.began.count("bear-base-0") == 2
-    assert set(states(tmp_path / "once").values()) == {DONE}
-    execution = go(tmp_path / "twice", fails("bear-base-0", -9))
-    assert "was ended by SIGKILL" in execution.failures["bear-base-0"]
+@pytest.mark.parametrize(
+    ("codes", "done", "times", "why"),
+    [
+        pytest.param([-9, None], False, 2, "", id="a process that dies is replaced once"),
+        pytest.param([-9, -9], False, 2, "was ended by SIGKILL", id="and not twice"),
+        pytest.param([-9], True, 1, "", id="one that dies after its work was done has done it"),
+        pytest.param([0], False, 1, "exited with 0, but", id="one without its output has failed"),
+    ],
+)
+def test_a_job_is_judged_by_its_process_and_its_output(
+    tmp_path: Path, codes: list[int | None], done: bool, times: int, why: str
+) -> None:
+    ends = iter(codes)
+
+    def act(name: str, request: Any) -> int | None:
+        if name != "bear-push-0":
+            return None
+        if done:
+            write_output(request)
+        return next(ends)
+
+    worker = Fake(act)
+    failures = go(tmp_path, worker).failures
+    assert worker.began.count("bear-push-0") == times
+    assert list(failures) == ["bear-push-0"] * bool(why)
+    assert why in failures.get("bear-push-0", "")
 
 
 @pytest.mark.parametrize("seconds", [module._PATIENCE / 2, module._PATIENCE * 2])
@@ -168,21 +178,6 @@ def test_a_run_that_a_dying_process_has_is_waited_for(
         assert set(states(tmp_path).values()) == {DONE}
     else:
         assert execution.failures.keys() == {"cheetah-base-0"}
-
-
-def test_a_process_that_dies_after_its_work_was_done_has_done_it(tmp_path: Path) -> None:
-    def act(name: str, request: Any) -> int | None:
-        write_output(request)
-        return -9
-
-    dead = Fake(act)
-    assert not go(tmp_path, dead).failures
-    assert dead.began == list(jobs(SMALL))
-
-
-def test_a_job_that_ends_well_without_its_output_has_failed(tmp_path: Path) -> None:
-    execution = go(tmp_path, fails("bear-push-0", 0))
-    assert "exited with 0, but" in execution.failures["bear-push-0"]
 
 
 @pytest.mark.usefixtures("now")
@@ -293,13 +288,6 @@ def test_a_run_that_cannot_be_made_fails_its_job_with_the_reason(tmp_path: Path)
     assert states(tmp_path)["cheetah-push-0-nominal"] == SKIPPED
     assert states(tmp_path)["bear-push-0"] == DONE
     assert not (tmp_path / "runs/cheetah-push-0").exists()
-
-
-def test_what_is_evaluated_by_hand_into_a_study_does_not_count(tmp_path: Path) -> None:
-    again(tmp_path)
-    asked = request_of(jobs(SMALL)["bear-push-0-nominal"], tmp_path)
-    write_output(asked.model_copy(update={"replicas": 8}))
-    assert again(tmp_path)[0] == "bear-push-0-nominal"
 
 
 def test_what_an_evaluation_took_is_its_last_attempt_and_training_all_its_slices(

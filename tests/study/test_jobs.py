@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -24,12 +25,23 @@ from draft.study import graph as graphs
 from draft.study.capacity import Capacity
 from draft.study.costs import ASSUMED_RATE, Rates, hours
 from draft.study.graph import graph
-from draft.study.jobs import Evaluating, Group, Job, Physics, Training
+from draft.study.jobs import AUTO, Evaluating, Group, Job, Physics, Training
 from draft.study.requests import EvaluateRequest, ReportRequest, TrainRequest
 from tests.learn.small import member
 from tests.study.small import TEXT, groups, jobs, request_of, study, write_output
 
 HEIGHT = "set: {rewards.height: 0.5}\n"
+
+
+def asked(job: Job, folder: Path, how: Physics = AUTO) -> Any:
+    """What a worker is asked to do for a job."""
+    return job.request(folder, "cpu", None, how)
+
+
+def training(made: dict[str, Job], name: str) -> Training:
+    job = made[name]
+    assert isinstance(job, Training)
+    return job
 
 
 def differing(a: dict[str, Job], b: dict[str, Job]) -> set[str]:
@@ -54,8 +66,8 @@ def test_every_job_comes_after_what_it_needs_and_whole_seeds_come_first() -> Non
 def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
     made = jobs(TEXT.replace("levels: 2", "levels: 2, published: true"))
     run = f"{tmp_path}/runs/bear-push-1"
-    asked = made["bear-push-1"].request(tmp_path, "cuda", 1.5)
-    assert asked == TrainRequest(run=run, iterations=2, minutes=1.5, device="cuda")
+    train = made["bear-push-1"].request(tmp_path, "cuda", 1.5)
+    assert train == TrainRequest(run=run, iterations=2, minutes=1.5, device="cuda")
     evaluate = made["bear-push-1-perturbed-published"].request(tmp_path, "cpu", 1.0)
     assert evaluate == EvaluateRequest(
         run=run,
@@ -67,10 +79,9 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
         protocol="published",
         device="cpu",
     )
-    nominal = made["bear-push-1-nominal"].request(tmp_path, "cpu", None)
-    assert isinstance(nominal, EvaluateRequest)
+    nominal = asked(made["bear-push-1-nominal"], tmp_path)
     assert (nominal.errors, nominal.protocol) == (None, "walking")
-    assert made["report"].request(tmp_path, "cpu", None) == ReportRequest(study=str(tmp_path))
+    assert asked(made["report"], tmp_path) == ReportRequest(study=str(tmp_path))
 
 
 def test_a_training_is_prepared_once_and_starts_from_its_base(tmp_path: Path) -> None:
@@ -112,21 +123,16 @@ def test_the_key_of_an_evaluation_keeps_its_words(monkeypatch: pytest.MonkeyPatc
 def test_how_jobs_are_done_goes_to_the_requests_and_not_into_keys(tmp_path: Path) -> None:
     made, how = jobs(), Physics("native", 2)
     job = made["bear-base-0"]
-    train = job.request(tmp_path, "cpu", None, how)
-    assert isinstance(train, TrainRequest)
-    assert (train.engine, train.replicas) == ("native", 2)
-    evaluate = made["bear-base-0-nominal"].request(tmp_path, "cpu", None, how)
-    assert isinstance(evaluate, EvaluateRequest)
-    # Its replicas are roll-outs.
-    assert (evaluate.engine, evaluate.replicas) == ("native", 2)
-    assert made["report"].request(tmp_path, "cpu", None, how) == ReportRequest(study=str(tmp_path))
+    for name in ("bear-base-0", "bear-base-0-nominal"):  # Replicas of the latter are roll-outs.
+        request = asked(made[name], tmp_path, how)
+        assert (request.engine, request.replicas) == ("native", 2)
+    assert asked(made["report"], tmp_path, how) == ReportRequest(study=str(tmp_path))
     # A run that was begun goes on with as many processes as its state is of.
     write_output(request_of(job, tmp_path), done=1)
     state = tmp_path / "runs/bear-base-0/state.json"
     state.write_text(json.dumps({"iteration": 1, "processes": 1, "engine": "warp"}))
-    train = job.request(tmp_path, "cpu", None, how)
-    assert isinstance(train, TrainRequest)
-    assert (train.engine, train.replicas) == ("native", None)
+    request = asked(job, tmp_path, how)
+    assert (request.engine, request.replicas) == ("native", None)
 
 
 def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
@@ -134,8 +140,7 @@ def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
     text = TEXT.replace("[base, push]", "[base, velocity, terrain, push]") + "recipe: laptop\n"
     made = jobs(text)
     for stage in STAGES:
-        job = made[f"bear-{stage}-0"]
-        assert isinstance(job, Training)
+        job = training(made, f"bear-{stage}-0")
         assert (job.plan.ground, job.plan.config) == (LAPTOP.ground(stage), LAPTOP.config)
         # Only terrain makes the base policy, which is of a plane, see the ground.
         assert job.plan.see_ground == (stage == "terrain")
@@ -147,17 +152,14 @@ def test_a_policy_that_saw_the_ground_keeps_seeing_it(monkeypatch: pytest.Monkey
     monkeypatch.setitem(STAGES._items, "base", replace(STAGES["base"], uneven=True))
     made = jobs(TEXT + "recipe: laptop\n")
     for stage in ("base", "push"):
-        job = made[f"bear-{stage}-0"]
-        assert isinstance(job, Training)
+        job = training(made, f"bear-{stage}-0")
         assert (job.plan.ground, job.plan.see_ground) == (LAPTOP.ground(stage), True)
 
 
 def test_inertia_errors_are_those_of_the_perturbed_arm(tmp_path: Path) -> None:
     made = jobs(TEXT.replace("levels: 2", "levels: 2, errors: paper"))
     for arm, errors in (("perturbed", "paper"), ("nominal", None)):
-        asked = made[f"bear-push-1-{arm}"].request(tmp_path, "cpu", None)
-        assert isinstance(asked, EvaluateRequest)
-        assert asked.errors == errors
+        assert asked(made[f"bear-push-1-{arm}"], tmp_path).errors == errors
 
 
 def test_numbers_of_the_file_are_those_of_its_runs(tmp_path: Path) -> None:
@@ -274,17 +276,14 @@ def test_a_run_that_was_trained_further_is_done_and_evaluated_where_it_was_asked
     job = write(tmp_path, "bear-base-0", done=3)
     write(tmp_path, "bear-base-0", done=9)
     assert job.complete(tmp_path)
-    asked = jobs()["bear-base-0-nominal"].request(tmp_path, "cpu", None)
-    assert isinstance(asked, EvaluateRequest)
-    assert asked.checkpoint == 3
+    assert asked(jobs()["bear-base-0-nominal"], tmp_path).checkpoint == 3
     (tmp_path / "runs/bear-base-0/model_3.pt").unlink()
     assert not job.complete(tmp_path)
 
 
 def test_a_run_of_something_else_is_not_complete(tmp_path: Path) -> None:
     write_output(request_of(jobs(TEXT + HEIGHT)["bear-base-0"], tmp_path))
-    job = jobs()["bear-base-0"]
-    assert isinstance(job, Training)
+    job = training(jobs(), "bear-base-0")
     assert not job.complete(tmp_path)
     assert job.differing(job.output(tmp_path)) == ["rewards.height"]
     (job.output(tmp_path) / "run.json").write_text("[")

@@ -8,27 +8,17 @@ from typing import Any
 import pytest
 
 from draft.errors import DraftError
-from draft.learn.engine import machine
 from draft.learn.engine.machine import Machine
-from draft.study import capacity
 from draft.study import placement as module
 from draft.study.jobs import Physics
 from draft.study.placement import Placement, expected_capacity, make_workers
 from draft.study.workers import LocalWorker, RayWorker
-from tests.study.small import TEXT, study
-
-LARGE = TEXT.replace("environments: 4", "environments: 64")
+from tests.study.small import LARGE, machine_of, study
 
 
 @pytest.fixture(autouse=True)
 def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine of two cores without a GPU, where native MuJoCo can be used."""
-    for place in (capacity, machine):
-        monkeypatch.setattr(place, "cores", lambda: 2)
-    monkeypatch.setattr(machine, "obstacle", lambda: None)
-    cpu = Machine(["cpu"], machine.choose("auto", ["cpu"]), None, 2)
-    monkeypatch.setattr(module, "this_machine", lambda: cpu)
-    monkeypatch.setattr(module, "_devices", lambda word: ["cpu"])
+    machine_of(2, monkeypatch)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +26,6 @@ def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         (Placement(), False, [Physics("auto", 2)]),
         (Placement(engine="warp"), False, [Physics("warp", 1)] * 2),
-        (Placement(replicas=1), False, [Physics("auto", 1)] * 2),
         (Placement(workers=2, engine="native"), False, [Physics("native", 1)] * 2),
         (Placement(), True, [Physics("auto", 1)] * 2),
     ],

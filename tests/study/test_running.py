@@ -48,26 +48,22 @@ class Log(Watch):
 
 
 def test_a_study_runs_prints_nothing_and_says_what_was_done(
-    worker: Fake, capsys: pytest.CaptureFixture[str]
+    worker: Fake, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    outcome = run_study("mine.yaml")
-    assert worker.began == ORDER
+    watch = Log()
+    outcome = run_study("mine.yaml", watch=watch)
+    assert worker.began == watch.jobs == ORDER
+    assert watch.states == [(name, state) for name in ORDER for state in ("running", "done")]
+    assert watch.ticks >= len(ORDER)
     assert outcome.folder == Path("studies/mine").absolute()
     assert outcome.done
     assert outcome.jobs == dict.fromkeys(ORDER, "done")
     assert (outcome.failures, outcome.minutes_needed) == ({}, None)
     assert outcome.report == outcome.folder / "report/index.html"
     assert capsys.readouterr() == ("", "")
-
-
-def test_a_finished_study_needs_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
-    run_study("mine.yaml", "here")
-
-    def fails(*_: object) -> None:
-        raise AssertionError
-
-    monkeypatch.setattr(module, "make_workers", fails)
-    assert run_study(Path("mine.yaml"), Path("here")).done
+    # A finished study needs no worker.
+    monkeypatch.setattr(module, "make_workers", lambda *_: pytest.fail("a worker is made"))
+    assert run_study(Path("mine.yaml"), Path("studies/mine")).done
 
 
 def test_a_study_that_was_read_runs_as_its_file_does(worker: Fake) -> None:
@@ -91,15 +87,6 @@ def test_a_failure_is_returned_and_the_next_call_resumes(
     monkeypatch.setattr(module, "make_workers", lambda *_: [worker])
     assert run_study("mine.yaml").done
     assert worker.began[0] == "cheetah-push-0"
-
-
-def test_the_progress_can_be_watched() -> None:
-    watch = Log()
-    run_study("mine.yaml", watch=watch)
-    assert watch.jobs == ORDER
-    pairs = [(name, state) for name in ORDER for state in ("running", "done")]
-    assert watch.states == pairs
-    assert watch.ticks >= len(ORDER)
 
 
 def test_the_options_reach_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
