@@ -37,7 +37,8 @@ class Command:
             ended: object = main([*shlex.split(line), *words])
         except SystemExit as error:
             ended = error.code
-        said = Said(*self._capsys.readouterr())
+        printed = self._capsys.readouterr()
+        said = Said(printed.out, printed.err)
         assert ended == code, said
         assert "Traceback" not in said.err, said.err
         return said

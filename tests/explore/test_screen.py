@@ -9,6 +9,8 @@ import os
 import shlex
 import shutil
 import signal
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,20 @@ SPEC = draft.load("quadruped")
 GRID = ("thigh_length=0.2:0.5", "shank_length=0.2:0.5")
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Screens that were never stopped; each is computed once."""
+    folder = tmp_path_factory.mktemp("screens")
+
+    @cache
+    def screened(**changes: Any) -> Path:
+        out = folder / f"{len(list(folder.iterdir()))}.parquet"
+        run_screen(job(SPEC, **changes), out, HERE)
+        return out
+
+    return screened
+
+
 def test_the_rows_are_those_of_one_resolve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     metric(monkeypatch)
     one = job(SPEC, metrics=None, vary=VARY)
@@ -54,13 +70,12 @@ def test_the_rows_are_those_of_one_resolve(tmp_path: Path, monkeypatch: pytest.M
 
 @pytest.mark.parametrize("share", [0.9, 0.5, 0.05, 0.0])
 def test_rows_that_are_kept_are_those_of_a_screen_that_keeps_all(
-    tmp_path: Path, share: float
+    tmp_path: Path, share: float, finished: Callable[..., Path]
 ) -> None:
     """Whether few or many are kept, which are measured in two ways."""
-    run_screen(job(SPEC, metrics=None, vary=VARY), tmp_path / "all.parquet", HERE)
-    everything = pq.read_table(tmp_path / "all.parquet")
+    everything = pq.read_table(finished(metrics=None))
     limit = float(np.quantile(everything["mass"], share))
-    some = job(SPEC, metrics=None, vary=VARY, where=f"mass < {limit!r}")
+    some = job(SPEC, metrics=None, where=f"mass < {limit!r}")
     summary = run_screen(some, tmp_path / "some.parquet", HERE)
     found = pq.read_table(tmp_path / "some.parquet")
     kept = everything.filter(everything["mass"].to_numpy() < limit)
@@ -88,25 +103,24 @@ def test_the_file_says_what_it_is_and_is_not_computed_again(tmp_path: Path) -> N
 @pytest.mark.slow
 @given(after=st.integers(0, 9))
 def test_a_run_that_goes_on_gives_the_rows_of_one_never_stopped(
-    tmp_path_factory: pytest.TempPathFactory, after: int
+    tmp_path_factory: pytest.TempPathFactory, after: int, finished: Callable[..., Path]
 ) -> None:
     folder = tmp_path_factory.mktemp("run")
     one = job(SPEC, where="accepted")
-    run_screen(one, folder / "whole.parquet", HERE)
     with pytest.raises(StopError):
         run_screen(one, folder / "s.parquet", Stops(after))
     assert not (folder / "s.parquet").exists()
     summary = run_screen(one, folder / "s.parquet", HERE)
     assert summary["computed"] == 1000 - 100 * after
-    assert (folder / "s.parquet").read_bytes() == (folder / "whole.parquet").read_bytes()
+    assert (folder / "s.parquet").read_bytes() == finished(where="accepted").read_bytes()
 
 
 @pytest.mark.slow
-def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
-    one = job(SPEC)
-    run_screen(one, tmp_path / "one.parquet", HERE)
-    run_screen(one, tmp_path / "two.parquet", LocalEngine(2))
-    assert (tmp_path / "one.parquet").read_bytes() == (tmp_path / "two.parquet").read_bytes()
+def test_processes_give_the_rows_of_one_process(
+    tmp_path: Path, finished: Callable[..., Path]
+) -> None:
+    run_screen(job(SPEC), tmp_path / "two.parquet", LocalEngine(2))
+    assert (tmp_path / "two.parquet").read_bytes() == finished().read_bytes()
 
 
 def test_a_job_holds_the_files_of_its_spec(tmp_path: Path) -> None:
@@ -151,13 +165,17 @@ def test_a_spec_whose_files_are_gone_makes_no_job(tmp_path: Path) -> None:
         ({"spec": "cat"}, "spec differs"),
     ],
 )
-@pytest.mark.parametrize("finished", [True, False])
+@pytest.mark.parametrize("complete", [True, False])
 def test_another_run_is_refused_and_not_mixed(
-    tmp_path: Path, change: dict[str, Any], message: str, finished: bool
+    tmp_path: Path,
+    change: dict[str, Any],
+    message: str,
+    complete: bool,
+    finished: Callable[..., Path],
 ) -> None:
     out = tmp_path / "s.parquet"
-    if finished:
-        run_screen(job(SPEC), out, HERE)
+    if complete:
+        shutil.copy(finished(), out)
     else:
         with pytest.raises(StopError):
             run_screen(job(SPEC), out, Stops(3))
