@@ -198,6 +198,7 @@ def test_a_refused_design_is_named_with_its_findings_and_nothing_is_written(
     assert "add 'torque:leg' to 'allow'" in out
     assert "monoped (custom): refused" in out
     for words in ("build robot", "export robot", "check robot", "show robot"):
+        assert "beyond" in command(words, *TOO_STRONG, code=1).out
         told = command.json(words, *TOO_STRONG, code=1)
         assert set(told) == RECORD
         assert (told["accepted"], told["out"]) == (False, None)
