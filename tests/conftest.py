@@ -96,6 +96,14 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     return min(os.cpu_count() or 1, MOST_PROCESSES)
 
 
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str]) -> Any:
+    """Runs commands in this process."""
+    from tests.commands import Command
+
+    return Command(capsys)
+
+
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """One real browser for all tests of a process; pages wait as long as the test may last."""
