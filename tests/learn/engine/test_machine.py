@@ -59,7 +59,7 @@ STATES: dict[str, Any] = {
     "other": (["mujoco==3.11.0", "numpy"], "3.12.0"),
 }
 ANYWHERE = 'use `engine="warp"`, which runs anywhere'
-ON_GPUS = "`engine=\"native\"` runs on the CPU, not on cuda:0, cuda:1\n  add `device=\"cpu\"`"
+ON_GPUS = '`engine="native"` runs on the CPU, not on cuda:0, cuda:1\n  add `device="cpu"`'
 
 
 @pytest.mark.parametrize(
