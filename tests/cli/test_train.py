@@ -39,7 +39,6 @@ def brief_review(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @needs_mjlab
-@pytest.mark.usefixtures("brief_review")
 def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixture[str]) -> None:
     command = ["train", "cheetah", "--iterations", "2", *SMALL]
     assert main([*command, "--minutes", "1e-9"]) == 0

@@ -125,7 +125,7 @@ def reference(tmp_path_factory: pytest.TempPathFactory, shipped: Path) -> np.nda
     return walked(made(tmp_path_factory.mktemp("plain") / "robot", shipped, text))
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     names=st.lists(
         st.text("abcdefgh", min_size=2, max_size=6), min_size=3, max_size=3, unique=True

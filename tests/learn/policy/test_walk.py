@@ -47,14 +47,6 @@ def depth(walk: Walk) -> float:
     return -float(walk.data.contact.dist.min(initial=0.0))
 
 
-def test_it_walks_as_fast_as_it_is_asked_to() -> None:
-    walk = walking(seconds=2.0)
-    start = walk.data.qpos[0]
-    walk.advance(4.0)
-    assert (walk.data.qpos[0] - start) / 4.0 == pytest.approx(0.5, abs=0.1)
-    assert walk.falls == 0
-
-
 def test_a_new_body_keeps_the_state_and_walks_on() -> None:
     walk = walking(seconds=2.0)
     before = walk.data.qpos.copy(), walk.data.qvel.copy(), walk.data.time
@@ -63,9 +55,11 @@ def test_a_new_body_keeps_the_state_and_walks_on() -> None:
     np.testing.assert_array_equal(walk.data.qvel, before[1])
     assert walk.data.time == before[2]
     assert walk.fit.region.name == "the family of quadrupeds"
-    walk.advance(3.0)
+    walk.advance(1.0)
+    start = walk.data.qpos[0]
+    walk.advance(4.0)
+    assert (walk.data.qpos[0] - start) / 4.0 == pytest.approx(0.5, abs=0.1)  # as asked
     assert walk.falls == 0
-    assert walk.velocity[0] > 0.3
 
 
 def test_a_motor_that_moves_no_foot_does_not_move_the_robot() -> None:

@@ -12,12 +12,9 @@ import pytest
 torch = pytest.importorskip("torch")
 pytest.importorskip("mjlab")
 
-from mjlab.rl import MjlabOnPolicyRunner  # noqa: E402
-
 from draft.errors import DraftError  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.training.ppo import trainer as trainers  # noqa: E402
-from draft.learn.training.ppo.agent import agent_settings  # noqa: E402
 from draft.learn.training.ppo.checkpoint import read_checkpoint  # noqa: E402
 from draft.learn.training.ppo.log import Table, read  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
@@ -270,16 +267,6 @@ def test_numbers_that_are_none_stop_training_and_leave_the_last_state(
         trainer.train(3)
     after = {p.name: p.read_bytes() for p in run.folder.iterdir() if p.is_file()}
     assert after == before
-
-
-def test_mjlab_itself_reads_a_checkpoint(base: tuple[Run, Trainer]) -> None:
-    trainer = base[1]
-    numbers = agent_settings(trainer._run.plan.config, "base", seed=5)
-    runner = MjlabOnPolicyRunner(trainer._wrapped, numbers, None, "cpu")
-    runner.load(str(base[0].checkpoint()[1]))
-    state = runner.alg.get_policy().state_dict()
-    assert same(state, trainer.runner.alg.get_policy().state_dict())
-    assert runner.current_learning_iteration == 3
 
 
 def test_progress_has_rewards_by_term(base: tuple[Run, Trainer]) -> None:
