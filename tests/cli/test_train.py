@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib.util
 import signal
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -30,15 +31,17 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def brief_review(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The review after a training lasts one second instead of eight."""
+def small_review(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The review after a training has four robots at each level instead of 64."""
     pytest.importorskip("mjlab")
     from draft.learn.measuring.rollout import review
 
-    monkeypatch.setattr(review, "SECONDS", 1.0)
+    for name in ("review", "before"):
+        monkeypatch.setattr(review, name, partial(getattr(review, name), replicas=4))
 
 
 @needs_mjlab
+@pytest.mark.usefixtures("small_review")
 def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixture[str]) -> None:
     command = ["train", "cheetah", "--iterations", "2", *SMALL]
     assert main([*command, "--minutes", "1e-9"]) == 0
@@ -98,7 +101,7 @@ def test_ctrl_c_keeps_the_policy_and_says_so_and_who_uses_it_says_it_is_unfinish
 
 
 @needs_mjlab
-@pytest.mark.usefixtures("brief_review")
+@pytest.mark.usefixtures("small_review")
 def test_a_later_stage_finds_the_base_run_beside_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["train", "cheetah", "--iterations", "1", *SMALL]) == 0
     assert main(["train", "cheetah", "--stage", "push", "--iterations", "1", *SMALL]) == 0
@@ -112,7 +115,7 @@ def test_a_later_stage_finds_the_base_run_beside_it(capsys: pytest.CaptureFixtur
 
 
 @needs_mjlab
-@pytest.mark.usefixtures("brief_review")
+@pytest.mark.usefixtures("small_review")
 def test_a_run_is_one_processs_at_a_time(capsys: pytest.CaptureFixture[str]) -> None:
     command = ["train", "cheetah", "--iterations", "1", *SMALL]
     assert main([*command, "--minutes", "1e-9"]) == 0
@@ -123,7 +126,7 @@ def test_a_run_is_one_processs_at_a_time(capsys: pytest.CaptureFixture[str]) -> 
 
 
 @needs_mjlab
-@pytest.mark.usefixtures("brief_review")
+@pytest.mark.usefixtures("small_review")
 def test_a_family_is_drawn_and_trained_in_one_simulation(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
