@@ -114,6 +114,8 @@ def test_the_top_speed_is_that_after_the_run_up() -> None:
     )
     assert short.top_speed == pytest.approx(long.top_speed, rel=0.03)
     assert short.cost_of_transport == pytest.approx(long.cost_of_transport, rel=0.1)
+    assert short.inside.all()
+    assert short.kick > 1.0
 
 
 @pytest.fixture
@@ -227,16 +229,6 @@ def test_a_policy_that_does_not_see_its_design_is_refused(tmp_path: Path) -> Non
     for open_it in (lambda: of_run(blind), lambda: open_source(policy("cheetah").file)):
         with pytest.raises(DraftError, match="does not see its design"):
             open_it()
-
-
-def test_a_surface_of_the_shipped_policy_needs_no_run(capsys: pytest.CaptureFixture[str]) -> None:
-    source = open_source()
-    assert source.name == "the family of quadrupeds"
-    one = ("thigh_length=0.25,0.3", "actuators.leg.peak_torque=70,90")
-    found = surface(open_design("cheetah"), one, source, replicas=2, seconds=3.0)
-    assert found.learned.inside.all()
-    assert (found.learned.top_speed > 1.5).all()
-    assert (found.learned.kick > 1.0).all()
 
 
 def test_an_exported_policy_gives_the_surface_of_its_run(run: Run, found: Surface) -> None:
