@@ -233,12 +233,14 @@ def test_a_joint_at_its_speed_limit_is_named_with_its_speed(
     policy = walk.fit.policy
     torques = np.tile(0.1 * policy.peak_torque, (10, 1))
     speeds = np.tile(0.1 * policy.no_load_speed, (10, 1))
-    # Faster than the motor for four steps of ten; at the peak torque, though it is fast, for three.
+    # Faster than the motor for four steps of ten, and at the peak torque for one; at the peak
+    # torque, though it is fast, for three.
     speeds[:4, 5] = 1.2 * policy.no_load_speed[5]
     torques[:4, 5] = policy.torque_bounds(speeds)[1][:4, 5]
+    torques[4, 5] = policy.peak_torque[5]
     speeds[:3, 7], torques[:3, 7] = -0.8 * policy.no_load_speed[7], policy.peak_torque[7]
     monkeypatch.setattr(walk, "loads", lambda: (torques, speeds))
-    assert limiting(walk) == (policy.joints[5], "speed", pytest.approx(0.4))
+    assert limiting(walk) == (policy.joints[5], "speed", pytest.approx(0.5))
     speeds[:, 5] = 0.0
     assert limiting(walk) == (policy.joints[7], "torque", pytest.approx(0.3))
 
