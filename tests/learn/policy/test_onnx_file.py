@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from draft.errors import DraftError
@@ -95,15 +95,21 @@ def relu(made: Any) -> Any:
     return made
 
 
+def without_bias(made: Any) -> Any:
+    del made.graph.node[2].input[2]
+    return made
+
+
 @pytest.mark.parametrize(
     ("made", "words"),
     [
         (model(transB=0), "transB"),
         (model(alpha=2.0), "'alpha': 2.0"),
         (relu(model()), "it has a node 'Relu'; known: Sub, Div"),
+        (without_bias(model()), "is not a policy that Draft can read"),
         (None, "cannot read"),
     ],
-    ids=["attribute", "other number", "unknown node", "missing"],
+    ids=["attribute", "other number", "unknown node", "few inputs", "missing"],
 )
 def test_networks_of_others_are_refused(tmp_path: Path, made: Any, words: str) -> None:
     path = tmp_path / "none.onnx" if made is None else saved(tmp_path, made)
@@ -122,6 +128,7 @@ def test_a_truncated_file_is_reported(tmp_path: Path, cut: float) -> None:
 
 
 @given(data=st.binary(max_size=300))
+@example(data=b"8\x00")  # A number where a graph should be.
 @settings(max_examples=80)
 def test_any_bytes_are_refused_in_words(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "any.onnx"
