@@ -28,20 +28,20 @@ def check_masses(env: Any, models: Sequence[Any], tolerance: float) -> None:
     """
     import torch
 
-    drawn, native = np.random.default_rng(0), hasattr(env.sim, "_batch")
+    drawn = np.random.default_rng(0)
+    native = env.sim._batch.bind("M") if hasattr(env.sim, "_batch") else None
     for _ in range(5):
         pose = env.sim.data.qpos.double()
         quat = torch.from_numpy(drawn.normal(size=(env.num_envs, 4)))
         pose[:, 3:7] = quat / quat.norm(dim=1, keepdim=True)
         pose[:, 7:] = torch.from_numpy(drawn.uniform(-1.5, 1.5, (env.num_envs, 12)))
-        if native:  # Its states are in double precision.
+        if native is not None:  # Its states are in double precision.
             env.sim.state[:, 1 : 1 + pose.shape[1]] = pose
         else:
             env.sim.data.qpos[:] = pose.float()
             pose = env.sim.data.qpos.double()
         env.sim.forward()
-        kept = env.sim._batch.bind("M") if native else env.sim.data.M.numpy()
-        for world, entries in enumerate(kept):
+        for world, entries in enumerate(env.sim.data.M.numpy() if native is None else native):
             model = models[world % len(models)]
             data = mujoco.MjData(model)
             data.qpos[:] = pose[world].numpy()
