@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib.util
 import signal
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -24,16 +25,17 @@ needs_mjlab = pytest.mark.skipif(
 
 
 @pytest.fixture
-def brief_review(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The review after a training lasts one second instead of eight."""
+def small_review(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The review after a training has four robots at each level instead of 64."""
     pytest.importorskip("mjlab")
     from draft.learn.measuring.rollout import review
 
-    monkeypatch.setattr(review, "SECONDS", 1.0)
+    for name in ("review", "before"):
+        monkeypatch.setattr(review, name, partial(getattr(review, name), replicas=4))
 
 
 @needs_mjlab
-@pytest.mark.usefixtures("brief_review")
+@pytest.mark.usefixtures("small_review")
 def test_a_run_is_trained_gone_on_with_and_then_done(command: Command) -> None:
     asked = ("train cheetah --iterations 2", *SMALL)
     said = command(*asked, "--minutes", "1e-9").out
@@ -95,7 +97,7 @@ def test_ctrl_c_keeps_the_policy_and_later_stages_and_others_say_that_it_is_unfi
 
 
 @needs_mjlab
-@pytest.mark.usefixtures("brief_review")
+@pytest.mark.usefixtures("small_review")
 def test_a_family_is_drawn_and_trained_in_one_simulation(command: Command) -> None:
     vary = "--vary thigh_length=0.2:0.3 --bodies 3 --see-design --iterations 1"
     assert "quadruped-3-bodies-base-0" in command(f"train quadruped {vary}", *SMALL).out
