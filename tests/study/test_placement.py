@@ -13,7 +13,8 @@ from draft.learn.engine.machine import Machine
 from draft.study import capacity
 from draft.study import placement as module
 from draft.study.jobs import Physics
-from draft.study.placement import Placement, expected_capacity, make_workers
+from draft.study.options import Placement
+from draft.study.placement import expected_capacity, make_workers
 from draft.study.workers import LocalWorker, RayWorker
 from tests.study.small import TEXT, study
 
@@ -72,7 +73,7 @@ def test_workers_take_the_gpus_that_this_process_sees(monkeypatch: pytest.Monkey
 
 
 def test_a_gpu_that_is_not_here_can_be_estimated_for() -> None:
-    assumed = expected_capacity(study(), Placement("cuda:7"))
+    assumed = expected_capacity(study(), Placement(device="cuda:7"))
     assert assumed is not None
     assert (assumed.engine.name, assumed.on_cpu, assumed.at_once) == ("warp", False, None)
 
@@ -106,8 +107,8 @@ class _Ray(types.ModuleType):
     [
         ({"CPU": 5.0, "GPU": 3.0}, Placement(ray=True), 3, "cuda"),
         ({"CPU": 5.0, "GPU": 3.0}, Placement(ray=True, workers=2), 2, "cuda"),
-        ({"CPU": 5.0}, Placement("cpu", ray=True), 5, "cpu"),
-        ({"CPU": 5.0}, Placement("cpu", ray=True, replicas=2), 2, "cpu"),
+        ({"CPU": 5.0}, Placement(device="cpu", ray=True), 5, "cpu"),
+        ({"CPU": 5.0}, Placement(device="cpu", ray=True, replicas=2), 2, "cpu"),
     ],
 )
 def test_a_cluster_has_a_worker_per_gpu_or_per_group_of_cores(
@@ -131,8 +132,10 @@ def test_a_cluster_without_a_gpu_is_reported(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_options_out_of_range_are_refused() -> None:
     for workers in (0, 1025):
-        with pytest.raises(DraftError, match=f"`workers` {workers} is not from 1 to 1024"):
-            Placement(workers=workers).check()
+        with pytest.raises(
+            DraftError, match=f"`workers` {workers} is not a whole number from 1 to 1024"
+        ):
+            Placement.of({"workers": workers})
     with pytest.raises(DraftError, match=r"`address` is for a Ray cluster\n.*`ray`"):
-        Placement(address="here:1").check()
-    Placement(workers=2, ray=True, address="here:1").check()
+        Placement.of({"address": "here:1"})
+    Placement.of({"workers": 2, "ray": True, "address": "here:1"})

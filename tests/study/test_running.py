@@ -11,7 +11,7 @@ from draft.study import read_study, run_study
 from draft.study import running as module
 from draft.study.execution import Watch
 from draft.study.jobs import Job
-from draft.study.placement import Placement
+from draft.study.options import RunOptions
 from draft.study.store import Store
 from tests.study.small import SMALL, Fake, jobs
 
@@ -103,15 +103,15 @@ def test_the_progress_can_be_watched() -> None:
 
 
 def test_the_options_reach_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    found: list[Placement] = []
+    found: list[RunOptions] = []
 
-    def make(study: object, placement: Placement) -> list[Fake]:
+    def make(study: object, placement: RunOptions) -> list[Fake]:
         found.append(placement)
         return [Fake()]
 
     monkeypatch.setattr(module, "make_workers", make)
     run_study("mine.yaml", device="cpu", workers=2, engine="native", replicas=3)
-    assert found == [Placement("cpu", 2, "native", 3)]
+    assert found == [RunOptions(device="cpu", workers=2, engine="native", replicas=3)]
 
 
 def test_too_short_a_time_limit_does_nothing_and_says_what_is_needed(worker: Fake) -> None:
@@ -122,9 +122,9 @@ def test_too_short_a_time_limit_does_nothing_and_says_what_is_needed(worker: Fak
 
 def test_bad_options_are_refused_before_anything_is_written() -> None:
     for minutes in (0.0, -1.0, float("nan"), 1e7):
-        with pytest.raises(DraftError, match=r"`minutes` .* is not above 0"):
+        with pytest.raises(DraftError, match=r"`minutes` .* is not a number above 0"):
             run_study("mine.yaml", minutes=minutes)
-    with pytest.raises(DraftError, match="`workers` 0 is not from 1"):
+    with pytest.raises(DraftError, match="`workers` 0 is not a whole number from 1"):
         run_study("mine.yaml", workers=0)
     with pytest.raises(DraftError, match=r"none\.yaml: file not found"):
         run_study("none.yaml")

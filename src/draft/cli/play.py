@@ -12,14 +12,13 @@ import tyro
 
 from draft.cli.options import (
     DESIGN_FORMS,
-    DeviceOption,
-    EngineOption,
     HostOption,
     OwnPolicies,
     PortOption,
     TokenOption,
 )
 from draft.cli.play_output import FRAMES, Output, output
+from draft.cli.settings_options import with_options
 from draft.cli.spelling import spelt
 from draft.design import Design
 from draft.design.references import find_design
@@ -27,6 +26,7 @@ from draft.errors import DraftError, counted, suggest
 from draft.extras import need
 from draft.files import write
 from draft.learn.engine.machine import choose, devices
+from draft.learn.measuring.evaluation_options import OnDevice
 from draft.learn.policy.policy import designs, short
 from draft.learn.silence import quiet
 from draft.learn.training.run import is_run, open_run
@@ -39,6 +39,7 @@ MOST_ROBOTS = 64
 _SPECIAL = ", ".join(designs())  # Designs with policies of their own.
 
 
+@with_options(OnDevice)
 def main(
     run: Annotated[
         tyro.conf.Positional[str],
@@ -49,6 +50,7 @@ def main(
         ),
     ],
     /,
+    *,
     skill: Annotated[
         Literal["walk", "run", "climb", "push"] | None,
         tyro.conf.arg(
@@ -134,8 +136,7 @@ def main(
             help_behavior_hint="(default: no ONNX)",
         ),
     ] = None,
-    device: DeviceOption = "auto",
-    engine: EngineOption = "auto",
+    on: OnDevice,
     host: HostOption = "127.0.0.1",
     port: PortOption = 8080,
     token: TokenOption = None,
@@ -170,8 +171,8 @@ def main(
     opened = open_run(Path(run))
     iteration, _ = opened.checkpoint(checkpoint)
     asked = make_output(opened.folder / "play.mp4", opened.folder / "policy.onnx")
-    chosen = devices(device)[0]
-    stepped = choose(engine, [chosen])
+    chosen = devices(on.device)[0]
+    stepped = choose(on.engine, [chosen])
     quiet()
     need("mjlab", "learn")
     print(spelt(opened.policy_line(iteration)), flush=True)

@@ -187,13 +187,15 @@ class Training(Job):
         run = runs.Run(self.output(folder), self.plan)
         # A run that was started keeps the number of processes of its state.
         replicas = physics.replicas if run.processes() is None else None
-        return TrainRequest(
-            run=str(run.folder),
-            iterations=self.iterations,
-            minutes=minutes,
-            device=device,
-            engine=physics.engine,
-            replicas=replicas,
+        return TrainRequest.of(
+            {
+                "run": str(run.folder),
+                "iterations": self.iterations,
+                "minutes": minutes,
+                "device": device,
+                "engine": physics.engine,
+                "replicas": replicas,
+            }
         )
 
     def record(self) -> dict[str, object]:

@@ -14,6 +14,7 @@ import draft  # noqa: E402
 from draft.design.references import open_design  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.measuring import learned_metrics as learned  # noqa: E402
+from draft.learn.measuring.evaluation_options import BodyRollOuts  # noqa: E402
 from draft.learn.measuring.policies import open_source  # noqa: E402
 from draft.metrics import of_policy  # noqa: E402
 from tests.learn.policy.test_matching import GO2, LEGS, made, tree  # noqa: E402
@@ -33,7 +34,7 @@ def test_other_names_signs_and_order_walk_as_fast(tmp_path: Path) -> None:
     other = open_design(tmp_path / "other")
     source = open_source()
     (one, _), (two, _) = (
-        learned.of_designs(source, design, device="cpu", replicas=4, seconds=4.0)
+        learned.of_designs(source, design, BodyRollOuts(replicas=4, seconds=4.0), device="cpu")
         for design in (plain, other)
     )
     assert one.inside.all()

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from draft.learn.training.run import Plan
 
 SPEED, ASCENT, DESCENT, PUSH, WALK = "speed", "ascent", "descent", "push", "walk"
-REPLICAS = 256
-SECONDS, SETTLE = 12.0, 2.0  # Duration of a roll-out, and time at its start not measured [s].
+PARTS = 6  # Of a roll-out; the first is not measured.
 KICKS = 4  # Parts of a roll-out between which kicks happen: at 3, 6 and 9 s.
 WALKING = 0.4  # Command of all tests but `speed` [m/s].
 # Published protocol: share of robots that stand, smallest vx of those commanded ahead [m/s].
@@ -122,7 +121,7 @@ def no_levels(given: str, most: float | None = None) -> DraftError:
 
 def settle(seconds: float) -> float:
     """Time at the start of a roll-out that is not measured [s]."""
-    return seconds / (SECONDS / SETTLE)
+    return seconds / PARTS
 
 
 def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:

@@ -84,7 +84,6 @@ class SliceOptions(Settings):
     device: Annotated[str, Shown("DEVICE")] = "auto"
     """Where to train: auto, cpu, cuda, cuda:1, all, or numbers of GPUs such as 0,1."""
     engine: EngineName = "auto"
-    """Physics: native MuJoCo on the CPU, or MuJoCo Warp; auto is native without a GPU."""
     replicas: Annotated[int | None, Field(ge=1, le=10**5), Shown("N", "one per physical core")] = (
         None
     )
