@@ -119,7 +119,7 @@ def test_a_run_is_one_processs_at_a_time(capsys: pytest.CaptureFixture[str]) -> 
     assert main([*command, "--minutes", "1e-9"]) == 0
     with lock(Path("runs/cheetah-base-0"), "draft train"):
         assert main(command) == BAD_INPUT
-    assert "another 'draft train' is running" in capsys.readouterr().err
+    assert "another training is running" in capsys.readouterr().err
     assert main(command) == 0
 
 

@@ -313,7 +313,7 @@ def test_two_processes_do_not_search_in_one_folder(
 
     with held(Path("o"), "draft optimise"):
         assert main(["optimise", "robot", *ARGUMENTS, "--trials", "5", "--out", "o"]) == 2
-    assert "another 'draft optimise' is running in 'o'" in capsys.readouterr().err
+    assert "another search is running in 'o'" in capsys.readouterr().err
     assert not Path("o/study.db").exists()
 
 

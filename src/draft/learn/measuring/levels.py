@@ -68,7 +68,7 @@ SKILL_TESTS = {
         SkillTest(WALK, "flat", "m/s", (WALKING,)),
     )
 }
-# Names on the command line, in the order of the published stages.
+# Names of the arguments `test`, in the order of the published stages.
 WORDS = {"walk": (WALK,), "speed": (SPEED,), "stairs": (ASCENT, DESCENT), "push": (PUSH,)}
 
 
@@ -139,27 +139,6 @@ def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:
     return tuple(levels[round(i * last / (count - 1))] for i in range(count))
 
 
-def check_stage(chosen: Sequence[SkillTest], stage: str, run: object) -> None:
-    """Check that skill tests are for the stage of a policy.
-
-    Args:
-        chosen: the tests.
-        stage: stage of the policy.
-        run: its run, for the message.
-
-    Raises:
-        DraftError: one is for another stage.
-    """
-    for test in chosen:
-        if _word(test) not in of_stage(stage):
-            cause = (
-                f"test '{_word(test)}' is for policies of stage {_stages(test)}, and "
-                f"{run} is of stage {stage}"
-            )
-            own = ", ".join(of_stage(stage))
-            raise DraftError(cause, f"use `test` {own}, or add `force`")
-
-
 def flags(
     chosen: Sequence[SkillTest], plan: Plan, iteration: int, reached: Reached = UNRECORDED
 ) -> list[str]:
@@ -173,9 +152,10 @@ def flags(
     """
     notes = []
     for test in chosen:
-        if _word(test) not in of_stage(plan.stage):
+        word = next(word for word, names in WORDS.items() if test.name in names)
+        if word not in of_stage(plan.stage):
             notes.append(
-                f"{test.name}: for policies of stage {_stages(test)}; this one is of stage "
+                f"{test.name}: for policies of stage {stages_of(word)}; this one is of stage "
                 f"{plan.stage}"
             )
         most = trained(test.name, plan, iteration, reached)
@@ -219,10 +199,6 @@ def trained(name: str, plan: Plan, iteration: int, reached: Reached = UNRECORDED
     return min(config.commands.forward * root, limited.limit * slowest)
 
 
-def _stages(test: SkillTest) -> str:
-    """Names of the stages that a test is for."""
-    return ", ".join(name for name in STAGES if _word(test) in of_stage(name))
-
-
-def _word(test: SkillTest) -> str:
-    return next(word for word, names in WORDS.items() if test.name in names)
+def stages_of(word: str) -> str:
+    """Names of the stages that a name in WORDS is for."""
+    return ", ".join(name for name in STAGES if word in of_stage(name))

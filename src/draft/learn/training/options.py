@@ -16,6 +16,7 @@ from pydantic import Field
 from pydantic_core import CoreSchema, core_schema
 
 from draft.learn.engine.machine import EngineName
+from draft.learn.task.constants import MOST_ITERATIONS
 from draft.learn.task.recipes import RecipeName
 from draft.learn.task.stages import StageName
 from draft.settings import Settings, Shown
@@ -77,7 +78,9 @@ class TaskOptions(Settings):
 class SliceOptions(Settings):
     """What does not change what is learned: how far, for how long, and on what."""
 
-    iterations: Annotated[int | None, Field(ge=1, le=10**7), Shown("N", "the stage's")] = None
+    iterations: Annotated[
+        int | None, Field(ge=1, le=MOST_ITERATIONS), Shown("N", "the stage's")
+    ] = None
     """Iterations in all slices."""
     minutes: Annotated[float | None, Field(gt=0, le=10**6), Shown("M", "no limit")] = None
     """Time limit [min]; repeat the training to resume."""
