@@ -116,7 +116,9 @@ def _open(names: Sequence[str], options: Options) -> list[Run]:
     return runs
 
 
-def _tests(runs: Sequence[Run], asked: Sequence[str] | None, force: bool) -> list[Sequence[str]]:
+def _tests(
+    runs: Sequence[Run], asked: Sequence[str] | None, force: bool
+) -> Sequence[Sequence[str]]:
     """Return the names of each run's skill tests."""
     from draft.learn.measuring.evaluation import usual
 
