@@ -26,6 +26,7 @@ GROUND = {
     "geometry",
     "files",
     "extras",
+    "lazy",
     "extensions",
     "offscreen",
     "mujoco_log",
@@ -51,8 +52,8 @@ BELOW: dict[str, set[str]] = {
     # what designs can do
     "metrics": {"laws", "spec", "design", "model"},
     "variation": {"laws", "spec"},
-    "explore": {"laws", "spec", "design", "model", "metrics", "variation"},
     "learn": {"laws", "spec", "design", "model", "metrics", "variation", "serving"},
+    "explore": {"laws", "spec", "design", "model", "metrics", "variation", "learn"},
     "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"},
     "studio": {
         *("laws", "spec", "design", "model", "metrics", "explore", "learn"),
@@ -71,14 +72,6 @@ BELOW: dict[str, set[str]] = {
     "__init__": set(),
     "__main__": {"cli"},
 }
-# The verbs, and metrics of behaviour: the only calls that go up, each from its own function.
-VERBS = {
-    ("metrics/learned.py", "of_policy", "learn"),
-    ("metrics/learned.py", "digest", "learn"),
-    ("spec/spec.py", "Spec.resolve", "design"),
-    ("design/design.py", "Design.build", "model"),
-    ("design/design.py", "Design.build_batch", "model"),
-}
 HEAVY = (
     *("mujoco", "pydantic", "yaml", "numpy", "torch", "mjlab", "trimesh"),
     *("scipy", "pyarrow", "optuna", "ray"),
@@ -87,11 +80,16 @@ HEAVY = (
 
 @dataclass(frozen=True)
 class Import:
-    """An import of a part of Draft: in which file and function, of which module."""
+    """An import of a part of Draft: in which file and function, of which module.
+
+    Attributes:
+        by_verb: whether the function is marked as a `draft.lazy.verb`.
+    """
 
     file: str
     function: str
     module: str
+    by_verb: bool
 
     @property
     def part(self) -> str:
@@ -119,21 +117,22 @@ def _imports(path: Path) -> tuple[Import, ...]:
     """Imports of Draft that run: those for type checkers are left out."""
     file = path.relative_to(SOURCE).as_posix()
 
-    def walk(node: ast.AST, scope: tuple[str, ...]) -> Iterator[Import]:
+    def walk(node: ast.AST, scope: tuple[str, ...], verb: bool) -> Iterator[Import]:
         for child in ast.iter_child_nodes(node):
-            inner = scope
+            inner, marked = scope, verb
             if isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
                 inner = (*scope, child.name)
+                marked = "verb" in map(ast.unparse, child.decorator_list)
             if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
                 for other in child.orelse:
-                    yield from walk(other, scope)
+                    yield from walk(other, scope, verb)
                 continue
             for module in _modules(child):
                 if module.split(".")[0] == "draft":
-                    yield Import(file, ".".join(scope), module)
-            yield from walk(child, inner)
+                    yield Import(file, ".".join(scope), module, verb)
+            yield from walk(child, inner, marked)
 
-    return tuple(walk(_tree(path), ()))
+    return tuple(walk(_tree(path), (), False))
 
 
 def _modules(node: ast.AST) -> list[str]:
@@ -147,19 +146,33 @@ def _modules(node: ast.AST) -> list[str]:
 
 def _part_of(name: str) -> str:
     """Part of the house that a name of the package itself comes from."""
-    return draft._MODULES.get(name, f"draft.{name}").split(".")[1]
+    return (draft._MODULES.get(name) or f"draft.{name}").split(".")[1]
 
 
 def test_imports_run_one_way() -> None:
-    up = set()
     for item in (item for path in FILES for item in _imports(path)):
         allowed = GROUND if item.importer in GROUND else BELOW[item.importer] | GROUND
-        verb = (item.file, item.function, _part_of(item.part))
-        if verb in VERBS:
-            up.add(verb)
-        else:
-            assert _part_of(item.part) in allowed | {item.importer}, item
-    assert up == VERBS
+        assert item.by_verb or _part_of(item.part) in allowed | {item.importer}, item
+
+
+def test_a_verb_hands_on_to_one_later_package_and_needs_its_mark() -> None:
+    up: dict[tuple[str, str], set[str]] = {}
+    for item in (item for path in FILES for item in _imports(path) if item.by_verb):
+        later = up.setdefault((item.file, item.function), set())
+        if item.part not in BELOW[item.importer] | GROUND | {item.importer}:
+            assert item.importer in BELOW[item.part]
+            later.add(item.part)
+    assert up
+    assert all(len(later) == 1 for later in up.values()), up
+
+
+def test_only_packages_offer_names_that_are_imported_on_first_use() -> None:
+    offer = {
+        path.relative_to(SOURCE).as_posix()
+        for path in FILES
+        if re.search(r"^__getattr__ = on_first_use", path.read_text(encoding="utf-8"), re.M)
+    }
+    assert {file for file in offer if not file.endswith("__init__.py")} == {"extend.py"}
 
 
 def _starts_of_the_command_line(tree: ast.AST) -> list[int]:

@@ -66,14 +66,14 @@ NO_RUN = "is neither a run of 'draft train' nor a design"
         ("new", "new has no checkpoint yet"),
         ("run --checkpoint 7", "run has no checkpoint of iteration 7\n  checkpoints: 2, 10"),
         *(
-            (f"run --seconds={n}", "is not above 0 and at most 600")
+            (f"run --seconds={n}", "is not a number above 0 and of at most 600 s")
             for n in ("0", "-1", "nan", "inf", "1e9")
         ),
         *(
             (f"run --robots={n}", f"--robots {n} is not from 1 to 64")
             for n in ("0", "-3", "1000000")
         ),
-        *((f"run --command {n} 0 0", "is out of range") for n in ("nan", "inf", "1e6")),
+        *((f"run --command {n} 0 0", "is not three numbers") for n in ("nan", "inf", "1e6")),
         ("run --out a.avi", "--out 'a.avi' does not end in .mp4"),
         ("run --out robot/root.yaml/a.mp4", "root.yaml is not a folder"),
         ("run --out folder.mp4", "--out 'folder.mp4' is a folder"),
@@ -83,8 +83,8 @@ NO_RUN = "is neither a run of 'draft train' nor a design"
         ("run --onnx a.onnx b.onnx", "--onnx takes one file"),
         ("cheetah --robots 3", "--robots is for runs of 'draft train'"),
         ("cheetah --checkpoint 3", "--checkpoint is for runs of 'draft train'"),
-        ("cheetah --skill climb --step 2", "--step 2 is not from 0 to 0.6 m"),
-        ("cheetah --kick nan", "--kick nan is not from 0 to 100 m/s"),
+        ("cheetah --skill climb --step 2", "--step 2 is not a number from 0 to 0.6 m"),
+        ("cheetah --kick nan", "--kick nan is not a number from 0 to 100 m/s"),
         ("cheetah --out a.avi", "--out 'a.avi' does not end in .mp4"),
         ("run --skill run", "--skill is for designs"),
         ("run --kick 2", "--kick is for designs"),

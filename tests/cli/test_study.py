@@ -278,9 +278,10 @@ def test_designs_that_cannot_be_studied_are_reported_with_their_place(
     ("words", "said"),
     [
         ("none.yaml", "none.yaml: file not found"),
-        ("mine.yaml --minutes 0", "--minutes 0.0 is not above 0"),
-        ("mine.yaml --rate nan", "--rate nan is not above 0"),
-        ("mine.yaml --workers 0", "--workers 0 is not from 1"),
+        ("mine.yaml --minutes 0", "--minutes 0 is not a number above 0"),
+        ("mine.yaml --dry-run --rate nan", "--rate nan is not above 0"),
+        ("mine.yaml --rate 1e4", "--rate is for --dry-run"),
+        ("mine.yaml --workers 0", "--workers 0 is not a whole number from 1"),
         ("mine.yaml --address here:1", "--address is for a Ray cluster"),
         ("mine.yaml --out ' '", "--out names no folder"),
         ("mine.yaml --out .", "holds no study, but mine.yaml"),

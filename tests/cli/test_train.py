@@ -44,7 +44,7 @@ def test_a_run_is_trained_gone_on_with_and_then_done(command: Command) -> None:
     assert ", 4 worlds\n" in said
     assert "stopped: 0 of 2 iterations are kept, no policy; the same command resumes\n" in said
     with lock(Path("runs/cheetah-base-0"), "draft train"):
-        assert "another 'draft train' is running" in command(*asked, code=BAD_INPUT).err
+        assert "another training is running" in command(*asked, code=BAD_INPUT).err
     said = command(*asked).out
     assert "iteration 2/2" in said
     assert "linear_velocity" in said

@@ -212,7 +212,7 @@ def test_two_processes_do_not_write_to_one_place(tmp_path: Path) -> None:
     one = job(SPEC)
     with (
         Parts(tmp_path / "s.parquet.parts", one.manifest(), one.parts).held(),
-        pytest.raises(draft.DraftError, match="another 'draft screen' is running in"),
+        pytest.raises(draft.DraftError, match="another screen is running in"),
     ):
         run_screen(one, tmp_path / "s.parquet", HERE)
 

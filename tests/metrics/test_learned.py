@@ -37,7 +37,7 @@ def fast(
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pyarrow")
-    monkeypatch.setattr(metrics, "of_policy", fast)
+    monkeypatch.setattr("draft.explore.sweep.of_policy", fast)
 
 
 @needs_learning
@@ -126,7 +126,7 @@ def test_a_sweep_outside_the_region_is_another_sweep(
         asked.append(outside)
         return fast(*args, **options)
 
-    monkeypatch.setattr(metrics, "of_policy", recorded)
+    monkeypatch.setattr("draft.explore.sweep.of_policy", recorded)
     words = ["sweep", "quadruped", "--vary", "thigh_length=0.22:0.3", "--n", "2"]
     words += ["--metrics", "learned.top_speed", "--out", str(tmp_path / "sweep")]
     assert main([*words, "--outside"]) == 0

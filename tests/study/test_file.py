@@ -162,6 +162,10 @@ def test_a_family_is_read() -> None:
         (TEXT.replace("base: 3", "bse: 3"), "small.yaml:4:14: iterations.bse: unknown value 'bse'"),
         (TEXT.replace("levels: 2", "levels: two"), "evaluate.levels: expected a whole number"),
         (TEXT.replace("levels: 2", "seconds: 0"), "evaluate.seconds: expected a number from 0.5"),
+        (
+            TEXT + "set: {learning.iterations_base: 20000000}\n",
+            r"learning.iterations_base must be from 1 to 10000000, and is 20000000",
+        ),
         (TEXT.replace("levels: 2", "perturbed: 1"), "evaluate.perturbed: expected true or false"),
         (TEXT.replace("levels: 2", "errors: papr"),
          "small.yaml:6:33: evaluate.errors: unknown value 'papr'\n  did you mean 'paper'?"),

@@ -11,7 +11,8 @@ from draft.errors import DraftError
 from draft.learn.engine.machine import Machine
 from draft.study import placement as module
 from draft.study.jobs import Physics
-from draft.study.placement import Placement, expected_capacity, make_workers
+from draft.study.options import Placement
+from draft.study.placement import expected_capacity, make_workers
 from draft.study.workers import LocalWorker, RayWorker
 from tests.study.small import LARGE, machine_of, study
 
@@ -58,7 +59,7 @@ def test_each_gpu_has_a_worker_unless_more_are_asked_for(monkeypatch: pytest.Mon
 
 
 def test_a_machine_that_is_not_here_can_be_estimated_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    assumed = expected_capacity(study(), Placement("cuda:7"))
+    assumed = expected_capacity(study(), Placement(device="cuda:7"))
     assert assumed is not None
     assert (assumed.engine.name, assumed.on_cpu, assumed.at_once) == ("warp", False, None)
     # Where nothing can be learnt, no capacity is expected.
@@ -88,8 +89,8 @@ class _Ray(types.ModuleType):
     [
         ({"CPU": 5.0, "GPU": 3.0}, Placement(ray=True), ["cuda"] * 3),
         ({"CPU": 5.0, "GPU": 3.0}, Placement(ray=True, workers=2), ["cuda"] * 2),
-        ({"CPU": 5.0}, Placement("cpu", ray=True), ["cpu"] * 5),
-        ({"CPU": 5.0}, Placement("cpu", ray=True, replicas=2), ["cpu"] * 2),
+        ({"CPU": 5.0}, Placement(device="cpu", ray=True), ["cpu"] * 5),
+        ({"CPU": 5.0}, Placement(device="cpu", ray=True, replicas=2), ["cpu"] * 2),
     ],
 )
 def test_a_cluster_has_a_worker_per_gpu_or_per_group_of_cores(
@@ -113,11 +114,14 @@ def test_a_cluster_without_a_gpu_is_reported(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        *((Placement(workers=n), f"`workers` {n} is not from 1 to 1024") for n in (0, 1025)),
-        (Placement(address="here:1"), r"`address` is for a Ray cluster\n.*`ray`"),
+        *(
+            ({"workers": n}, f"`workers` {n} is not a whole number from 1 to 1024")
+            for n in (0, 1025)
+        ),
+        ({"address": "here:1"}, r"`address` is for a Ray cluster\n.*`ray`"),
     ],
 )
-def test_options_out_of_range_are_refused(given: Placement, words: str) -> None:
-    Placement(workers=2, ray=True, address="here:1").check()
+def test_options_out_of_range_are_refused(given: dict[str, Any], words: str) -> None:
+    Placement.of({"workers": 2, "ray": True, "address": "here:1"})
     with pytest.raises(DraftError, match=words):
-        given.check()
+        Placement.of(given)

@@ -12,7 +12,7 @@ from draft.study import read_study, run_study
 from draft.study import running as module
 from draft.study.execution import Watch
 from draft.study.jobs import Job
-from draft.study.placement import Placement
+from draft.study.options import RunOptions
 from draft.study.store import Store
 from tests.study.small import SMALL, Fake, jobs
 
@@ -90,15 +90,15 @@ def test_a_failure_is_returned_and_the_next_call_resumes(
 
 
 def test_the_options_reach_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    found: list[Placement] = []
+    found: list[RunOptions] = []
 
-    def make(study: object, placement: Placement) -> list[Fake]:
+    def make(study: object, placement: RunOptions) -> list[Fake]:
         found.append(placement)
         return [Fake()]
 
     monkeypatch.setattr(module, "make_workers", make)
     run_study("mine.yaml", device="cpu", workers=2, engine="native", replicas=3)
-    assert found == [Placement("cpu", 2, "native", 3)]
+    assert found == [RunOptions(device="cpu", workers=2, engine="native", replicas=3)]
 
 
 def test_too_short_a_time_limit_does_nothing_and_says_what_is_needed(worker: Fake) -> None:

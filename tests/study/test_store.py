@@ -175,7 +175,7 @@ def test_a_file_where_the_folder_should_be_is_reported(tmp_path: Path) -> None:
 def test_two_at_once_do_not_work_on_one_folder(tmp_path: Path) -> None:
     one = store(tmp_path)
     one.open()
-    with pytest.raises(DraftError, match=r"another 'draft study' is running .* \(process \d+\)"):
+    with pytest.raises(DraftError, match=r"another run of the study is running .* \(process \d+\)"):
         store(tmp_path).open()
     one.close()
     other = store(tmp_path)

@@ -17,6 +17,7 @@ from draft.design.solids import Pose, lowest
 from draft.errors import DraftError, counted
 from draft.geometry import Frame, Rotation, Vector
 from draft.laws.structure import MIDDLE
+from draft.lazy import verb
 from draft.spec.primitives.base import Geom
 from draft.spec.primitives.root import TrunkPart
 from draft.values import Mask, Value, brief, either, negate, some
@@ -389,6 +390,7 @@ class Design:
         """
         return lowest(self, home)
 
+    @verb
     def build(self) -> Model:
         """Compile the design to MJCF, which MuJoCo loads and checks.
 
@@ -404,6 +406,7 @@ class Design:
             raise DraftError(f"this is {counted(self.count, 'design')}", remedy)
         return build(self)
 
+    @verb
     def build_batch(self, rows: NDArray[np.intp] | None = None) -> ModelBatch:
         """Compile N designs at once: a template, and arrays of the fields in which they differ.
 

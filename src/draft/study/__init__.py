@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from draft.lazy import on_first_use
+
 if TYPE_CHECKING:
     from draft.study.file import read as read_study
     from draft.study.report.writing import write as write_report
@@ -15,18 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["read_study", "run_study", "write_report"]
 
-_HOMES = {
-    "read_study": ("draft.study.file", "read"),
-    "run_study": ("draft.study.running", "run_study"),
-    "write_report": ("draft.study.report.writing", "write"),
+_MODULES = {
+    "read_study": "draft.study.file:read",
+    "run_study": "draft.study.running",
+    "write_report": "draft.study.report.writing:write",
 }
-
-
-def __getattr__(name: str) -> object:
-    """Import the functions on first use, so that a module of this package stays light."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'draft.study' has no attribute '{name}'")
-    import importlib
-
-    module, function = _HOMES[name]
-    return getattr(importlib.import_module(module), function)
+__getattr__ = on_first_use(__name__, _MODULES)

@@ -129,7 +129,7 @@ def test_equal_seeds_agree_and_others_do_not(members: Any) -> None:
 
 
 def test_kicks_come_at_three_six_and_nine_seconds(members: Any) -> None:
-    of = Trial(Task(members[:1], "push", CONFIG), (levels("push", 1.0, 12.0),), replicas=1)
+    of = Trial(Task(members[:1], "push", CONFIG), (levels("push", 1.0, 12.0),), 1, 12.0, 2.0)
     params = env_cfg(of, of.tests, layout(of, of.tests)).events["kick"].params
     assert params == {"most": (1.0, 12.0), "steps": (150, 300, 450)}
     for seconds in (0.5, 1.3, 8.1, 12.1):

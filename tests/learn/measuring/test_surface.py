@@ -21,6 +21,7 @@ from draft.learn.bodies.features import family_features, features  # noqa: E402
 from draft.learn.bodies.legged import legged_robot  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.measuring import learned_metrics as learned  # noqa: E402
+from draft.learn.measuring.evaluation_options import BodyRollOuts  # noqa: E402
 from draft.learn.measuring.policies import _of_file, of_run, open_source  # noqa: E402
 from draft.learn.measuring.rollout.evaluate import evaluate  # noqa: E402
 from draft.learn.measuring.rollout.trial import Trial  # noqa: E402
@@ -30,7 +31,6 @@ from draft.learn.measuring.utilisation import Histograms  # noqa: E402
 from draft.learn.policy.policy import FAMILY, open_policy, policy  # noqa: E402
 from draft.learn.task.recipes import LAPTOP  # noqa: E402
 from draft.learn.training.run import Plan, Run  # noqa: E402
-from draft.metrics.learned import SECONDS  # noqa: E402
 from tests.learn.measuring.columns import worlds  # noqa: E402
 from tests.learn.runs import begin, exported, trained  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
@@ -109,8 +109,8 @@ def test_the_top_speed_is_that_after_the_run_up() -> None:
     # Roll-outs of 18 s are measured from 12 s on, three times as long as this body speeds up.
     source, design = open_source(None), open_design("cheetah")
     (short, _), (long, _) = (
-        learned.of_designs(source, design, device="cpu", replicas=2, seconds=seconds)
-        for seconds in (SECONDS, 3 * SECONDS)
+        learned.of_designs(source, design, rollouts, device="cpu")
+        for rollouts in (BodyRollOuts(replicas=2), BodyRollOuts(replicas=2, seconds=18.0))
     )
     assert short.top_speed == pytest.approx(long.top_speed, rel=0.03)
     assert short.cost_of_transport == pytest.approx(long.cost_of_transport, rel=0.1)
@@ -140,18 +140,19 @@ def test_only_slow_bodies_are_asked_for_the_lower_speeds(
     # Speeds are asked for and compared; robots that are kicked are worlds of their own.
     monkeypatch.setattr(learned, "KICKS", learned.KICKS[:1])
     source = open_source(None)
-    found, _ = learned.of_designs(source, two, device="cpu", replicas=1)
+    found, _ = learned.of_designs(source, two, BodyRollOuts(replicas=1), device="cpu")
     levels = learned.speeds(source)
     assert asked == [(2, levels[3], levels[-1]), (1, levels[0], levels[2])]
     monkeypatch.setattr(learned, "LEAD", np.inf)  # All are asked for all.
-    every, _ = learned.of_designs(source, two, device="cpu", replicas=1)
+    every, _ = learned.of_designs(source, two, BodyRollOuts(replicas=1), device="cpu")
     np.testing.assert_allclose(found.top_speed, every.top_speed, rtol=0.05)
 
 
 def test_progress_has_a_total_from_the_start_and_rises_to_it(two: Design) -> None:
     told: list[tuple[int, int]] = []
-    numbers = {"device": "cpu", "replicas": 1, "seconds": 1.0}
-    learned.of_designs(open_source(None), two, **numbers, report=lambda *at: told.append(at))
+    few = BodyRollOuts(replicas=1, seconds=1.0)
+    source = open_source(None)
+    learned.of_designs(source, two, few, device="cpu", report=lambda *at: told.append(at))
     assert told[0] == (0, 2)
     assert told[-1] == (2, 2)
     assert told == sorted(told)
@@ -210,8 +211,11 @@ def test_the_command_writes_a_table_a_figure_and_a_record(
     ("words", "message"),
     [
         (["--vary", "thigh_length=0.2:0.3"], "a surface needs two ranges, and --vary has 1"),
-        (["--vary", *PLANE, "--points", "1"], "--points 1 is not from 2 to 100"),
-        (["--vary", *PLANE, "--replicas", "0"], "--replicas 0 is not from 1 to 1000"),
+        (["--vary", *PLANE, "--points", "1"], "--points 1 is not a whole number from 2 to 100"),
+        (
+            ["--vary", *PLANE, "--replicas", "0"],
+            "--replicas 0 is not a whole number from 1 to 1000",
+        ),
         (["--vary", PLANE[0], "thigh=1:2"], "'thigh'"),
         (["--vary", PLANE[0], "trunk_length=1.6:1.7"], "leaves the range"),
     ],

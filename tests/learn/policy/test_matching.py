@@ -20,6 +20,7 @@ from draft.errors import DraftError
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import obstacle
 from draft.learn.measuring import learned_metrics as learned
+from draft.learn.measuring.evaluation_options import BodyRollOuts
 from draft.learn.measuring.policies import open_source
 from draft.learn.policy.gait import record
 from draft.learn.policy.matching import Match, Structure, match, structure_of
@@ -352,7 +353,7 @@ def test_other_names_signs_and_order_walk_as_fast_in_mjlab(tmp_path: Path, shipp
     made(tmp_path / "other", shipped, tree(("swing", "thigh", "calf"), SIGNS, LEGS[::-1]))
     source = open_source()
     (one, _), (two, _) = (
-        learned.of_designs(source, design, device="cpu", replicas=4, seconds=4.0)
+        learned.of_designs(source, design, BodyRollOuts(replicas=4, seconds=4.0), device="cpu")
         for design in (open_design("quadruped"), open_design(tmp_path / "other"))
     )
     assert one.inside.all()

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 import draft
 from draft.errors import DraftError
 from draft.learn.policy.controller import Controller
+from draft.learn.policy.play_options import Course
 from draft.learn.policy.playback import KICK_EVERY, Playback, Scenario, playback, usual
 from draft.learn.policy.policy import FAMILY, SKILLS, Policy, designs, policy, scan_points
 from draft.learn.task.groups import Observations
@@ -167,11 +168,14 @@ def test_each_stage_is_shown_by_what_it_taught() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"command": (math.nan, 0.0, 0.0)}, "`command` nan 0 0 is out of range"),
-        ({"step": 2.0}, "`step` 2 is not from 0 to 0.6 m"),
-        ({"kick": -3.0}, "`kick` -3 is not from 0 to 100 m/s"),
-        ({"seconds": 0.0}, "`seconds` 0 is not above 0 and at most 600"),
-        ({"seconds": math.nan}, "`seconds` nan is not above 0 and at most 600"),
+        (
+            {"command": (math.nan, 0.0, 0.0)},
+            "`command` [nan, 0, 0] is not three numbers from -100 to 100",
+        ),
+        ({"step": 2.0}, "`step` 2 is not a number from 0 to 0.6 m"),
+        ({"kick": -3.0}, "`kick` -3 is not a number from 0 to 100 m/s"),
+        ({"seconds": 0.0}, "`seconds` 0 is not a number above 0 and of at most 600 s"),
+        ({"seconds": math.nan}, "`seconds` nan is not a number above 0 and of at most 600 s"),
         ({"skill": "dance"}, "there is no skill 'dance'"),
         ({"policy": "none.onnx"}, "cannot read none.onnx"),
     ],
@@ -188,8 +192,8 @@ def test_bad_arguments_are_one_line_with_what_to_give(
 def test_a_skill_sets_the_scene_unless_it_is_given(cheetah: draft.Design) -> None:
     climbing, _ = playback(cheetah, "climb")
     assert climbing.policy.stage == "terrain"
-    assert climbing.model.ngeom > playback(cheetah, "climb", step=0.0)[0].model.ngeom
-    assert playback(cheetah, "push", kick=0.5)[0].kick == 0.5
+    assert climbing.model.ngeom > playback(cheetah, "climb", course=Course(step=0.0))[0].model.ngeom
+    assert playback(cheetah, "push", course=Course(kick=0.5))[0].kick == 0.5
 
 
 def test_a_robot_outside_the_region_is_played_with_a_warning() -> None:

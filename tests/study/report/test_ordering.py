@@ -13,11 +13,9 @@ from hypothesis import strategies as st
 
 pytest.importorskip("pyarrow")
 
-from draft.study.report.choice import median_seed
 from draft.study.report.gather import gather
 from draft.study.report.ordering import Ordering, by_chance, of_study, order
 from draft.study.report.tables import certainty
-from tests.learn import synthetic
 
 numbers = st.lists(st.integers(-50, 50).map(float), min_size=1, max_size=4)
 
@@ -94,15 +92,3 @@ def test_a_studys_designs_are_ordered_by_their_medians(source: Path) -> None:
     assert found is not None
     assert [name.partition(":")[2] for name in found.designs] == ["giraffe", "bear", "cheetah"]
     assert set(found.seeds.values()) == {3}
-
-
-def test_the_policy_that_ships_is_that_of_the_median_seed(source: Path, tmp_path: Path) -> None:
-    study = gather(source)
-    for design in synthetic.DESIGNS:
-        speeds = {seed: synthetic.able(design, seed, "nominal")[0] for seed in (0, 1, 2)}
-        chosen = median_seed(study, f"quadruped:{design}")
-        assert chosen is not None
-        assert speeds[chosen] == statistics.median(speeds.values())
-    even = synthetic.study(tmp_path, ("cheetah",), (0, 1), ("nominal",), ("velocity",))
-    speeds = [synthetic.able("cheetah", seed, "nominal")[0] for seed in (0, 1)]
-    assert median_seed(gather(even), "quadruped:cheetah") == speeds.index(min(speeds))

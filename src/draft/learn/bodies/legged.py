@@ -176,7 +176,7 @@ def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
     model = model or design.build()
     joints = tuple(design.joints)
     index = {joint: i for i, joint in enumerate(joints)}
-    home = _home(design, model, name)
+    home = _home(design, name)
     sites = [foot_of(design, chain) for chain in chains]
     return LeggedRobot(
         name=name,
@@ -243,7 +243,7 @@ def check_family(members: Sequence[LeggedRobot]) -> None:
                 raise DraftError(cause, remedy)
 
 
-def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
+def _home(design: Design, name: str) -> tuple[float, ...]:
     """Home pose; the crouch if the spec gives none."""
     home = {joint: scalar(one.home) for joint, one in design.joints.items()}
     if not any(home.values()):

@@ -61,7 +61,7 @@ def collect(source: Path, out: Path) -> Collected:
     omitted: list[str] = []
     new = _finished(gather(source), omitted)
     if not new.singles:
-        remedy = "; ".join(omitted) or "resume it with 'draft study'"
+        remedy = "; ".join(omitted) or "resume the study"
         raise DraftError(f"'{source}' has no finished run", remedy)
     merged = _merged(old, new) if old else new
     _check_alike(merged, target)

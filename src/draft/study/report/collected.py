@@ -237,7 +237,7 @@ def read(folder: Path) -> Study:
         cause = f"'{folder}' is the folder of a study, whose results are not collected yet"
         raise DraftError(cause, study_command(["collect", str(folder), "--out", "DIR"]))
     if not is_results(folder):
-        remedy = "name a folder that 'draft study collect' wrote"
+        remedy = "name a folder of collected results"
         raise DraftError(f"'{folder}' holds no results of a study", remedy)
     study = _read(folder / STUDY, StudyFile)
     robots = {path.stem: _robot(path) for path in sorted((folder / DESIGNS).glob("*.json"))}
@@ -321,5 +321,5 @@ def _evaluation(path: Path, run: Trained, name: str, file: EvaluationFile) -> Ev
 
 
 def _broken(path: Path, why: str) -> DraftError:
-    remedy = "restore it, or delete the folder and repeat 'draft study collect'"
+    remedy = "restore it, or delete the folder and collect the results again"
     return DraftError(f"{path} cannot be read as results: {why}", remedy)

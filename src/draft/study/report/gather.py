@@ -40,7 +40,7 @@ def gather(folder: Path) -> Study:
                 warnings += [f"{problem.cause}; it is omitted" for problem in error.problems]
     kept = _kept(found, warnings)
     if not kept:
-        remedy = "; ".join(warnings) or "'draft study FILE.yaml' makes one"
+        remedy = "; ".join(warnings) or "name the folder of a study"
         raise DraftError(f"'{folder}' has no run of a study to report on", remedy)
     evaluations = [one for path, run in kept.items() for one in _evaluations(path, run, warnings)]
     runs = sorted(kept.values(), key=lambda one: one.place)
