@@ -1,0 +1,36 @@
+"""A command that runs in this process, and what it prints."""
+
+from __future__ import annotations
+
+import io
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+from draft.cli import main
+
+
+def _run(words: tuple[str | Path, ...]) -> tuple[int, str, str]:
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = main([*map(str, words)])
+    return code, out.getvalue(), err.getvalue()
+
+
+def printed(*words: str | Path, code: int = 0) -> str:
+    """What a command prints that ends with a code, and without a word of an error."""
+    found, out, err = _run(words)
+    assert (found, err) == (code, "")
+    return out
+
+
+def refusal(*words: str | Path) -> str:
+    """The error that a command ends with, having printed nothing else."""
+    found, out, err = _run(words)
+    assert (found, out) == (2, "")
+    assert err.startswith("error: ")
+    return err.removeprefix("error: ")
+
+
+def line(text: str) -> str:
+    """A text whose lines were broken to the width of a terminal, as one line."""
+    return " ".join(text.split())
