@@ -23,12 +23,12 @@ def printed(*words: str | Path, code: int = 0) -> str:
     return out
 
 
-def refusal(*words: str | Path) -> str:
-    """The error that a command ends with, having printed nothing else."""
+def refusal(*words: str | Path, first: str = "") -> str:
+    """The error that a command ends with, having printed nothing but, perhaps, some words first."""
     found, out, err = _run(words)
     assert (found, out) == (2, "")
-    assert err.startswith("error: ")
-    return err.removeprefix("error: ")
+    assert err.startswith(f"{first}error: ")
+    return err.removeprefix(f"{first}error: ")
 
 
 def line(text: str) -> str:

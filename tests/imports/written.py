@@ -32,8 +32,8 @@ def imported(
 
 def translated(
     text: str,
-    file: str = "beast.urdf",
     options: Options | None = None,
+    file: str = "beast.urdf",
     population: str | None = None,
 ) -> Files:
     """Translate a description in the working directory, nothing else written."""
