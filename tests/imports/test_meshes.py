@@ -208,6 +208,7 @@ def test_a_small_part_in_metres_is_left_alone() -> None:
     assert units.factors([0.6, 0.0003], [(1, 1, 1), (0.001,) * 3], 0.7, 0.4, set()) == [1, 1000]
     assert units.factors([600.0], [(1, 1, 1)], 0.0, 0.0, set()) == [1]
     assert units.factors([], [], 0.7, 0.4, set()) == []
+    assert units.factors([2.0], [(1, 1, 1)], 0.7, 0.4, set()) == [1]  # Of no scale that is known.
 
 
 def test_a_collada_file_counts_for_the_trunk() -> None:

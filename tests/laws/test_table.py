@@ -65,90 +65,97 @@ def test_other_known_units_are_converted(tmp_path: Path) -> None:
         assert getattr(there, quantity) == pytest.approx(getattr(here, quantity), rel=1e-6)
 
 
-@pytest.mark.parametrize("column", [c.heading for c in COLUMNS if c.required])
-def test_a_row_without_what_every_module_needs_is_refused(tmp_path: Path, column: str) -> None:
-    message = _message(_write(tmp_path, GOOD, {**GOOD, "name": "M2", column: ""}, header=[*GOOD]))
-    assert "extra.csv:3" in message
-    assert f"{column} of 'M2' is missing" in message or column == "name"
+def test_a_bad_number_that_may_be_blank_is_skipped_and_said(tmp_path: Path) -> None:
+    cells = {"gear_ratio": "-3", "rotor_inertia_kg_m2": "high"}
+    parts, skipped = read_parts(_write(tmp_path, {**GOOD, **cells}))
+    assert [str(one).split("extra.csv:2: ")[1].split("\n")[0] for one in skipped] == [
+        "gear_ratio of 'M1' is -3, not above zero: skipped",
+        "rotor_inertia_kg_m2 of 'M1' is 'high', not a number: skipped",
+    ]
+    assert (parts["M1"].gear_ratio, parts["M1"].rotor_inertia) == (None, None)
+
+
+def without(column: str) -> list[dict[str, str]]:
+    return [{key: value for key, value in GOOD.items() if key != column}]
+
+
+def named(old: str, new: str) -> list[dict[str, str]]:
+    """The good row under another heading."""
+    return [{new if key == old else key: value for key, value in GOOD.items()}]
+
+
+M2 = "'M2'"
+# Rows, and what of each message follows the file's name.
+BAD: dict[str, tuple[list[dict[str, str]], tuple[str, ...]]] = {
+    **{
+        f"no {column}": (
+            [GOOD, {**GOOD, "name": "M2", column: ""}],
+            (f":3: {column if column == 'name' else f'{column} of {M2}'} is missing",),
+        )
+        for column in (one.heading for one in COLUMNS if one.required)
+    },
+    **{
+        f"{cell} for a {column}": ([{**GOOD, column: cell}], (f":2: {column} of 'M1' is {words}",))
+        for column in ("peak_torque_nm", "mass_kg", "length_mm")
+        for cell, words in (
+            ("-3", "-3, not above zero"),
+            ("0", "0, not above zero"),
+            ("nan", "nan, not a finite number"),
+            ("inf", "inf, not a finite number"),
+            ("1e999", "1e999, not a finite number"),
+            ("12 Nm", "'12 Nm', not a number"),
+        )
+    },
+    "an unknown unit": (
+        named("mass_kg", "mass_lb"),
+        (":1: unknown column 'mass_lb'\n  unknown unit 'lb'; use mass_kg or mass_g",),
+    ),
+    "no unit": (
+        named("mass_kg", "mass"),
+        (":1: unknown column 'mass'\n  the unit is missing; use mass_kg or mass_g",),
+    ),
+    "an unknown unit of two words": (
+        named("no_load_speed_rad_s", "no_load_speed_hz"),
+        (":1: unknown column 'no_load_speed_hz'\n  unknown unit 'hz'",),
+    ),
+    "an unknown column": (
+        named("vendor", "vendors"),
+        (":1: unknown column 'vendors'\n  did you mean 'vendor'",),
+    ),
+    "two columns for one quantity": (
+        [{**GOOD, "mass_g": "500"}],
+        (":1: two columns give 'mass'",),
+    ),
+    "no column": (without("mass_kg"), (":1: no column 'mass_kg'",)),
+    "several": (
+        [{**GOOD, "name": f"M{i}", "mass_kg": "-1"} for i in range(3)],
+        (":2: mass_kg of 'M0'", ":3: mass_kg of 'M1'", ":4: mass_kg of 'M2'"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_table_is_refused_with_every_line(tmp_path: Path, name: str) -> None:
+    rows, words = BAD[name]
+    message = _message(_write(tmp_path, *rows, header=[*rows[0]]))
+    assert [one for one in words if f"extra.csv{one}" not in message] == []
 
 
 @pytest.mark.parametrize(
-    ("cell", "words"),
+    ("data", "words"),
     [
-        ("-3", "is -3, not above zero"),
-        ("0", "is 0, not above zero"),
-        ("nan", "is nan, not a finite number"),
-        ("inf", "is inf, not a finite number"),
-        ("1e999", "is 1e999, not a finite number"),
-        ("12 Nm", "is '12 Nm', not a number"),
+        (None, "extra.csv: cannot be read"),
+        (b"", "no column 'name'"),
+        (b"\xff\xfe\x00name", "is not a CSV table"),
+        (",".join(GOOD).encode() + b"\nM2,Acme\n", "extra.csv:2: 2 cells under 11 headings"),
     ],
 )
-@pytest.mark.parametrize("column", ["peak_torque_nm", "mass_kg", "length_mm"])
-def test_a_bad_number_that_every_module_needs_is_refused(
-    tmp_path: Path, column: str, cell: str, words: str
-) -> None:
-    message = _message(_write(tmp_path, {**GOOD, column: cell}))
-    assert f"extra.csv:2: {column} of 'M1' {words}" in message
-
-
-@pytest.mark.parametrize("column", ["gear_ratio", "rotor_inertia_kg_m2"])
-@pytest.mark.parametrize("cell", ["-3", "nan", "high"])
-def test_a_bad_number_that_may_be_blank_is_skipped_and_said(
-    tmp_path: Path, column: str, cell: str
-) -> None:
-    parts, skipped = read_parts(_write(tmp_path, {**GOOD, column: cell}))
-    (problem,) = skipped
-    assert f"extra.csv:2: {column} of 'M1' is" in str(problem)
-    assert ": skipped" in str(problem)
-    assert getattr(parts["M1"], column.removesuffix("_kg_m2")) is None
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("mass_kg", "mass_lb", "unknown unit 'lb'; use mass_kg or mass_g"),
-        ("mass_kg", "mass", "the unit is missing; use mass_kg or mass_g"),
-        ("no_load_speed_rad_s", "no_load_speed_hz", "unknown unit 'hz'"),
-        ("vendor", "vendors", "did you mean 'vendor'"),
-    ],
-)
-def test_an_unknown_unit_or_column_is_named(tmp_path: Path, old: str, new: str, words: str) -> None:
-    row = {new if k == old else k: v for k, v in GOOD.items()}
-    message = _message(_write(tmp_path, row))
-    assert f"extra.csv:1: unknown column '{new}'" in message
-    assert words in message
-
-
-def test_two_columns_for_one_quantity_are_refused(tmp_path: Path) -> None:
-    message = _message(_write(tmp_path, {**GOOD, "mass_g": "500"}))
-    assert "two columns give 'mass'" in message
-
-
-def test_a_missing_column_is_named_with_its_units(tmp_path: Path) -> None:
-    row = {k: v for k, v in GOOD.items() if k != "mass_kg"}
-    assert "extra.csv:1: no column 'mass_kg'" in _message(_write(tmp_path, row))
-
-
-def test_every_problem_of_a_table_is_listed(tmp_path: Path) -> None:
-    rows = [{**GOOD, "name": f"M{i}", "mass_kg": "-1"} for i in range(3)]
-    message = _message(_write(tmp_path, *rows))
-    assert [f"extra.csv:{line}" in message for line in (2, 3, 4)] == [True] * 3
-
-
-def test_a_row_of_another_length_is_refused(tmp_path: Path) -> None:
-    path = _write(tmp_path, GOOD)
-    path.write_text(path.read_text(encoding="utf-8") + "M2,Acme\n", encoding="utf-8")
-    assert "extra.csv:3: 2 cells under 11 headings" in _message(path)
-
-
-def test_a_file_that_is_not_there_a_folder_and_an_empty_one_are_named(tmp_path: Path) -> None:
-    assert "none.csv: cannot be read" in _message(tmp_path / "none.csv")
+def test_a_file_that_is_no_table_is_named(tmp_path: Path, data: bytes | None, words: str) -> None:
+    path = tmp_path / "extra.csv"
+    if data is not None:
+        path.write_bytes(data)
+    assert words in _message(path)
     assert "cannot be read" in _message(tmp_path)
-    empty = tmp_path / "empty.csv"
-    empty.write_text("", encoding="utf-8")
-    assert "no column 'name'" in _message(empty)
-    empty.write_bytes(b"\xff\xfe\x00name")
-    assert "is not a CSV table" in _message(empty)
 
 
 def test_a_name_that_is_there_already_is_refused_with_both_places(tmp_path: Path) -> None:
