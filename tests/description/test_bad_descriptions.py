@@ -1,4 +1,7 @@
-"""Whatever is wrong with a description is named with file and line, and stops nothing else."""
+"""Whatever is wrong with a description is named with file and line, and stops nothing else.
+
+Each message is pinned. `pytest --force-regen` accepts changed words.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pytest_regressions.file_regression import FileRegressionFixture
 
 from draft.description import mjcf, xmlfile
 from draft.description import urdf as urdf_reader
@@ -31,67 +35,38 @@ def weighing(mass: str) -> str:
     return urdf(f'<link name="a"><inertial>\n<mass value="{mass}"/></inertial></link>')
 
 
-TWICE = "keep one of these joints"
-# What the file says, and what of the message follows its name.
 BAD = {
-    "not well-formed": ("<robot>\n<link", ":2:1: not well-formed XML: unclosed token"),
-    "a spec": ("name: robot\n", ":1:1: not well-formed XML: syntax error"),
-    "another root": (
-        "<sdf/>",
-        ":1: the root element is <sdf>; a URDF has <robot>, an MJCF model",
-    ),
-    "entities": (
-        '<!DOCTYPE r [<!ENTITY a "b">]>\n<robot>&a;</robot>',
-        ":1: it has a DOCTYPE\n  remove it: a description needs no entities",
-    ),
-    "a fetched entity": (
-        '<!DOCTYPE r SYSTEM "http://example.org/x.dtd">\n<robot/>',
-        ":1: it has a DOCTYPE",
-    ),
-    "no links": ("<robot/>", ": it has no links"),
-    "two robots that share a link": (
-        tree("abc", ("x", "a", "c"), ("y", "b", "c")),
-        ":7: link 'c' is the child of joints 'x' and 'y' of separate trees\n  " + TWICE,
-    ),
-    "cyclic links": (
-        tree("ab", ("x", "a", "b"), ("y", "b", "a")),
-        ":5: cyclic links: every link has a parent (b <- a <- b)",
-    ),
-    "a ring beside the tree": (
-        tree("rab", ("x", "a", "b"), ("y", "b", "a")),
-        ":7: cyclic links (a <- b <- a)",
-    ),
-    "two roots": (tree("ab"), ":4: 2 links have no parent: a, b\n  keep one as the root, and"),
-    "a missing link": (
-        tree("a", ("x", "a", "b")),
-        ":4: joint 'x' names link 'b', which does not exist",
-    ),
-    "a mass that is no number": (
-        weighing("heavy"),
-        ':4: value="heavy" of <mass> is not a finite number',
-    ),
-    "an infinite mass": (weighing("1e999"), ':4: value="1e999" of <mass> is not a finite number'),
-    "a mass below zero": (weighing("-1"), ":4: mass -1 kg is below zero"),
-    "an include": (
-        '<mujoco>\n<include file="x.xml"/>\n<worldbody/></mujoco>',
-        ":2: it includes 'x.xml', which does not exist\n  copy the file beside the model",
-    ),
+    "not well-formed": "<robot>\n<link",
+    "a spec": "name: robot\n",
+    "another root": "<sdf/>",
+    "entities": '<!DOCTYPE r [<!ENTITY a "b">]>\n<robot>&a;</robot>',
+    "a fetched entity": '<!DOCTYPE r SYSTEM "http://example.org/x.dtd">\n<robot/>',
+    "no links": "<robot/>",
+    "two robots that share a link": tree("abc", ("x", "a", "c"), ("y", "b", "c")),
+    "cyclic links": tree("ab", ("x", "a", "b"), ("y", "b", "a")),
+    "a ring beside the tree": tree("rab", ("x", "a", "b"), ("y", "b", "a")),
+    "two roots": tree("ab"),
+    "a missing link": tree("a", ("x", "a", "b")),
+    "a mass that is no number": weighing("heavy"),
+    "an infinite mass": weighing("1e999"),
+    "a mass below zero": weighing("-1"),
+    "an include": '<mujoco>\n<include file="x.xml"/>\n<worldbody/></mujoco>',
     "an unknown class": (
-        '<mujoco><worldbody>\n<body name="a"><joint class="x"/></body></worldbody></mujoco>',
-        ":2: default class 'x' does not exist\n  classes: main",
+        '<mujoco><worldbody>\n<body name="a"><joint class="x"/></body></worldbody></mujoco>'
     ),
-    "deep nesting": ("<a>" * 1000 + "</a>" * 1000, ":1: nested too deeply"),
+    "deep nesting": "<a>" * 1000 + "</a>" * 1000,
 }
 
 
 @pytest.mark.parametrize("what", BAD)
-def test_a_bad_description_is_refused_with_file_and_line(what: str, tmp_path: Path) -> None:
-    text, message = BAD[what]
+def test_a_bad_description_is_refused_with_file_and_line(
+    what: str, tmp_path: Path, file_regression: FileRegressionFixture
+) -> None:
     path = tmp_path / "r.urdf"
-    path.write_text(text)
+    path.write_text(BAD[what])
     with pytest.raises(DescriptionError) as caught:
         describe(path, "r.urdf")
-    assert str(caught.value).startswith(f"r.urdf{message}")
+    file_regression.check(f"{caught.value}\n", basename=what.replace(" ", "_"))
 
 
 @pytest.mark.slow
