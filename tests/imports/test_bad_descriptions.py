@@ -28,8 +28,9 @@ def having(old: str, new: str) -> str:
     return text.replace(old, new, 1)
 
 
-def rod(limit: str) -> str:
+def rod(limit: str, reach: str = 'lower="-1" upper="1"') -> str:
     """The sound quadruped with a joint of these limits on line 35."""
+    limit = f"{limit} {reach}"
     return quadruped(link("rod") + joint("turn", "body", "rod", (0, 0, 0.1), limit=limit))
 
 
@@ -68,10 +69,10 @@ REFUSED: dict[str, str | bytes] = {
     "an inertia beyond all": having("ixx=", 'ixx="1e308" was='),
     "a centre of mass far away": having("<inertial>", '<inertial><origin xyz="0 -1e200 0"/>'),
     "a box beyond all": boxed("1e300"),
-    "an effort that is not a number": rod('lower="-1" upper="1" effort="nan"'),
-    "a speed that is not a number": rod('lower="-1" upper="1" effort="9" velocity="nan"'),
-    "a limit that is not a number": rod('lower="nan" effort="1"'),
-    "an effort that is a word": rod('lower="-1" upper="1" effort="much"'),
+    "an effort that is not a number": rod('effort="nan"'),
+    "a speed that is not a number": rod('effort="9" velocity="nan"'),
+    "a limit that is not a number": rod('effort="1"', 'lower="nan"'),
+    "an effort that is a word": rod('effort="much"'),
     "more links than a spec may have": quadruped(LONG),
 }
 
@@ -82,10 +83,9 @@ def test_what_no_robot_can_be_is_refused_with_its_line(
 ) -> None:
     text = REFUSED[name]
     Path(FILE).write_bytes(text if isinstance(text, bytes) else text.encode())
-    file_regression.check(
-        refusal("import", FILE, "--out", "deep/mine"), basename=name.replace(" ", "_")
-    )
+    told = refusal("import", FILE, "--out", "deep/mine")
     assert os.listdir() == [FILE]
+    file_regression.check(told, basename=name.replace(" ", "_"))
 
 
 SOUND = 'effort="9" velocity="9"'
@@ -105,12 +105,12 @@ NOTED = {
     "a speed below zero": rod('effort="9" velocity="-1"'),
     "a speed without end": rod('effort="9" velocity="inf"'),
     "a speed of nearly nothing": rod('effort="9" velocity="1e-300"'),
-    "a range of nothing": rod(f'lower="0" upper="0" {SOUND}'),
-    "no range": rod(SOUND),
-    "a range upside down": rod(f'lower="1" upper="-1" {SOUND}'),
-    "a range beyond all": rod(f'lower="-1e9" upper="1e9" {SOUND}'),
-    "a range in degrees": rod(f'lower="-90" upper="90" {SOUND}'),
-    "a range beyond two turns": rod(f'lower="100" upper="200" {SOUND}'),
+    "a range of nothing": rod(SOUND, 'lower="0" upper="0"'),
+    "no range": rod(SOUND, ""),
+    "a range upside down": rod(SOUND, 'lower="1" upper="-1"'),
+    "a range beyond all": rod(SOUND, 'lower="-1e9" upper="1e9"'),
+    "a range in degrees": rod(SOUND, 'lower="-90" upper="90"'),
+    "a range beyond two turns": rod(SOUND, 'lower="100" upper="200"'),
     "a mass of zero": quadruped().replace('mass value="1.0"', 'mass value="0"'),
     "a trunk of no mass": having('mass value="8.0"', 'mass value="0"'),
 }
@@ -120,8 +120,9 @@ NOTED = {
 def test_what_can_be_mended_is_a_warning_with_its_line(
     name: str, file_regression: FileRegressionFixture
 ) -> None:
-    told = "\n".join(notes(imported(NOTED[name])))
-    file_regression.check(told + "\n", basename=name.replace(" ", "_"))
+    usual = notes(imported(quadruped(), out="sound"))
+    told = [note for note in notes(imported(NOTED[name])) if note not in usual]
+    file_regression.check("\n".join(told) + "\n", basename=name.replace(" ", "_"))
     model = draft.load("mine").resolve().build().mujoco
     if name in TURNS:
         edge = 2 * np.pi * TURNS[name]
