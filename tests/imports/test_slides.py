@@ -23,7 +23,7 @@ STROKE = 'lower="0" upper="0.12" effort="2500" velocity="0.5"'
 DRIVES = "drives of prismatic joints"
 
 
-def kinds(spec: Spec) -> dict[str, str]:
+def kinds(spec: Spec) -> dict[str, str | None]:
     """Structural class of each body with a member."""
     found = {body.name: body.link.member for body in spec.bodies}
     return {name: member.fields.segment for name, member in found.items() if member is not None}

@@ -71,7 +71,8 @@ def structure_trends(
     end = _held_out(feet.fit(known_feet), *feet.columns(known_feet), keys, fits.proportional)
     table["quadruped"]["end"] = {**end.record(), **feet.quartiles(known_feet)}
     if "quadruped" in of:
-        across = holdout.across(*(populations[name] for name in SIZE), holdout.published)
+        people, quadrupeds = populations["humanoid"], populations["quadruped"]
+        across = holdout.across(people, quadrupeds, holdout.published)
         table["quadruped"]["held_out"]["by_humanoid_trends"] = across.fold
     return rounded(table)
 
