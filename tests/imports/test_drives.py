@@ -117,6 +117,14 @@ def test_larger_robots_get_stronger_joints() -> None:
     assert all(large[name].torque > small[name].torque for name in small)
 
 
+def test_a_guess_for_legs_longer_than_any_surveyed_is_less_certain() -> None:
+    usual, long = (
+        translated(biped(dict.fromkeys(TORQUES, None), height=height)).drives["left_knee_joint"]
+        for height in (1.0, 3.0)
+    )
+    assert long.sigma > usual.sigma + 0.1
+
+
 def test_one_joint_of_a_known_role_without_a_torque_is_driven() -> None:
     found = sources(translated(biped({"elbow": None})))
     assert (found["left_elbow_joint"], found["left_knee_joint"]) == ("assumed", "declared")

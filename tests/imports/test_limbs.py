@@ -129,6 +129,11 @@ def test_a_robot_is_what_its_limbs_are(kind: str) -> None:
     assert limbs.reason.startswith(reason)
 
 
+def test_a_robot_of_three_legs_is_nearest_to_quadrupeds() -> None:
+    limbs = found(robot(*legs(*FOUR[:2], (-0.3, 0))))
+    assert (limbs.population, limbs.legs) == ("quadruped", 3)
+
+
 def test_a_hopper_has_a_leg_where_its_base_is_free() -> None:
     leg = '<body name="{}" pos="0 0 {}"><inertial pos="0 0 -.1" mass="1"/><joint/>'
     text = (
