@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shlex
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
 from typing import Any, NamedTuple
-
-import pytest
 
 from draft.cli import main
 
@@ -21,10 +22,7 @@ class Said(NamedTuple):
 class Command:
     """Runs commands of `draft`, and reads what they print."""
 
-    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
-        self._capsys = capsys
-
-    def __call__(self, line: str, *words: str, code: int = 0) -> Said:
+    def __call__(self, line: str, *words: str | Path, code: int = 0) -> Said:
         """Run a command, which must end with this exit code and without a traceback.
 
         Args:
@@ -32,24 +30,43 @@ class Command:
             words: its other words.
             code: exit code.
         """
-        self._capsys.readouterr()
-        try:
-            ended: object = main([*shlex.split(line), *words])
-        except SystemExit as error:
-            ended = error.code
-        printed = self._capsys.readouterr()
-        said = Said(printed.out, printed.err)
+        out, err = io.StringIO(), io.StringIO()
+        with redirect_stdout(out), redirect_stderr(err):
+            try:
+                ended: object = main([*shlex.split(line), *map(str, words)])
+            except SystemExit as error:
+                ended = error.code
+        said = Said(out.getvalue(), err.getvalue())
         assert ended == code, said
         assert "Traceback" not in said.err, said.err
         return said
 
-    def json(self, line: str, *words: str, code: int = 0) -> Any:
+    def json(self, line: str, *words: str | Path, code: int = 0) -> Any:
         """Run a command with --json, and read the one object that it prints."""
         # Slow machines report progress beside it.
         return json.loads(self(line, *words, "--json", code=code).out)
 
-    def refuses(self, line: str, *words: str) -> str:
+    def refuses(self, line: str, *words: str | Path) -> str:
         """Run a command that ends with a message about bad input alone: the message."""
         said = self(line, *words, code=2)
         assert said.out == "", said.out
         return said.err
+
+
+def printed(*words: str | Path, code: int = 0, progress: bool = False) -> str:
+    """What a command prints that ends with a code and, but for its progress, without an error."""
+    said = Command()("", *words, code=code)
+    assert progress or not said.err
+    return said.out
+
+
+def refusal(*words: str | Path, first: str = "") -> str:
+    """The error that a command ends with, having printed nothing but, perhaps, some words first."""
+    err = Command().refuses("", *words)
+    assert err.startswith(f"{first}error: ")
+    return err.removeprefix(f"{first}error: ")
+
+
+def line(text: str) -> str:
+    """A text whose lines were broken to the width of a terminal, as one line."""
+    return " ".join(text.split())

@@ -97,11 +97,11 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 @pytest.fixture
-def command(capsys: pytest.CaptureFixture[str]) -> Any:
+def command() -> Any:
     """Runs commands in this process."""
     from tests.commands import Command
 
-    return Command(capsys)
+    return Command()
 
 
 @pytest.fixture(scope="session")
