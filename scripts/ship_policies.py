@@ -21,7 +21,7 @@ from draft.learn.training.ppo.onnx import export
 from draft.learn.training.run import is_run, open_run
 from draft.learn.watching.play import Player
 from draft.study.report.choice import median_seed
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 
 
 def main(folder: Path) -> None:
@@ -32,7 +32,7 @@ def main(folder: Path) -> None:
     if is_run(folder):
         _ship(folder, FAMILY)
         return
-    study = gather(folder)
+    study = read(folder)
     for design in study.titles:
         seed = median_seed(study, design)
         name = study.titles[design]

@@ -14,7 +14,7 @@ from draft.cli import BAD_INPUT, main
 from draft.errors import DraftError
 from draft.study.report.collect import collect
 from draft.study.report.comparison import comparison
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.spread import Spread
 from tests.learn import synthetic
 from tests.study.report.conftest import plan_of
@@ -47,7 +47,7 @@ def test_only_designs_seeds_and_skills_in_common_are_compared(
     main_study: Path, tmp_path: Path
 ) -> None:
     other = faster(tmp_path / "other", {"cheetah": 1.25, "bear": 0.5})
-    made = comparison(gather(main_study), gather(other))
+    made = comparison(read(main_study), read(other))
     cells = {(row[0], row[1]): row[2:] for row in made.rows}
     assert list(cells) == [
         ("top speed [m/s]", "cheetah"),
@@ -67,7 +67,7 @@ def test_only_designs_seeds_and_skills_in_common_are_compared(
 
 
 def test_results_of_one_name_have_columns_of_their_own(main_study: Path) -> None:
-    study = gather(main_study)
+    study = read(main_study)
     made = comparison(study, study)
     assert [column.title for column in made.columns][2:4] == ["main", "other main"]
     assert made.name == "against_other_main"
@@ -76,12 +76,10 @@ def test_results_of_one_name_have_columns_of_their_own(main_study: Path) -> None
 def test_it_is_said_whether_the_order_of_the_designs_is_the_same(
     main_study: Path, tmp_path: Path
 ) -> None:
-    alike = comparison(
-        gather(main_study), gather(faster(tmp_path / "a", dict.fromkeys(DESIGNS, 1.1)))
-    )
+    alike = comparison(read(main_study), read(faster(tmp_path / "a", dict.fromkeys(DESIGNS, 1.1))))
     assert "top speed: cheetah > bear in both" in alike.notes
     turned = comparison(
-        gather(main_study), gather(faster(tmp_path / "b", {"cheetah": 0.5, "bear": 1.0}))
+        read(main_study), read(faster(tmp_path / "b", {"cheetah": 0.5, "bear": 1.0}))
     )
     assert "top speed: cheetah > bear, but bear > cheetah in b" in turned.notes
 
@@ -92,9 +90,7 @@ def test_a_policy_of_the_other_study_that_does_not_walk_is_named(
     other = faster(tmp_path / "other", {"cheetah": 0.01})
     run = synthetic.trained(other, "cheetah", "base", 0)
     synthetic.evaluated(run, change=lambda s: s["tests"]["walk"].update(speed=[0.0]))
-    (said,) = [
-        note for note in comparison(gather(main_study), gather(other)).notes if "walk" in note
-    ]
+    (said,) = [note for note in comparison(read(main_study), read(other)).notes if "walk" in note]
     assert said.startswith("other: cheetah, seed 0, did not learn to walk")
 
 
@@ -107,7 +103,7 @@ def test_a_design_without_the_skill_in_the_other_study_is_named_with_the_reason(
 
     other = faster(tmp_path / "other", {"bear": 1.0})
     synthetic.evaluated(synthetic.trained(other, "cheetah", "velocity", 0), change=change)
-    made = comparison(gather(main_study), gather(other))
+    made = comparison(read(main_study), read(other))
     why = "seed 0: fewer than 80 % stay up at any command"
     assert f"cheetah has no top speed in other: {why}" in made.notes
     assert ("top speed [m/s]", "cheetah") not in [tuple(row[:2]) for row in made.rows]
@@ -121,7 +117,7 @@ def test_the_choices_that_differ_are_named(main_study: Path, tmp_path: Path) -> 
         told["config"]["physics"]["timestep"] = 0.001
         told["environments"] = 512
         file.write_text(json.dumps(told))
-    said = comparison(gather(main_study), gather(other)).caption
+    said = comparison(read(main_study), read(other)).caption
     assert "recipe paper instead of laptop" in said
     assert "512 instead of 4096 worlds in stage velocity" in said
     assert "physics.timestep 0.001 instead of 0.005" in said
@@ -130,7 +126,7 @@ def test_the_choices_that_differ_are_named(main_study: Path, tmp_path: Path) -> 
 def test_studies_without_anything_in_common_are_refused(main_study: Path, tmp_path: Path) -> None:
     other = faster(tmp_path / "other", {"giraffe": 1.0})
     with pytest.raises(DraftError) as refused:
-        comparison(gather(main_study), gather(other))
+        comparison(read(main_study), read(other))
     assert "'other' has no skill of a design and seed in common with 'main'" in str(refused.value)
     assert "quadruped:bear" in str(refused.value)
 

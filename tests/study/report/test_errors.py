@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("matplotlib")
 pytest.importorskip("pyarrow")
 
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.run_tables import remarks
 from tests.learn import synthetic
 from tests.study.report.pages import page_of, tables_of
@@ -30,7 +30,7 @@ def test_evaluations_with_other_inertia_errors_than_most_are_flagged(tmp_path: P
     folder = synthetic.study(tmp_path, **alone)
     run = synthetic.trained(folder, "bear", "push", 2)
     synthetic.evaluated(run, "perturbed", change=lambda summary: summary.update(errors="paper"))
-    study = gather(folder)
+    study = read(folder)
     words = "published errors, where others have errors of the twins of Go2 and B2"
     assert remarks(study) == [f"bear, push, perturbed inertia, seed 2: {words}: not to be compared"]
     (row,) = tables_of(folder)["evaluations"].rows
@@ -40,5 +40,5 @@ def test_evaluations_with_other_inertia_errors_than_most_are_flagged(tmp_path: P
 def test_unknown_inertia_errors_make_no_summary(tmp_path: Path) -> None:
     run = synthetic.trained(tmp_path, "bear", "push", 0)
     synthetic.evaluated(run, "perturbed", change=lambda summary: summary.update(errors="mine"))
-    (warning,) = gather(tmp_path).warnings
+    (warning,) = read(tmp_path).warnings
     assert "errors: Input should be 'twins', 'survey' or 'paper'" in warning

@@ -19,7 +19,7 @@ from pyarrow import parquet
 from draft.design.actuators import size
 from draft.learn.measuring.utilisation import CELL, CELLS
 from draft.study.report import figures, plane
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.occupancy import Utilisation, percentile
 from draft.study.report.tables import utilisation
 from tests.learn import synthetic
@@ -29,22 +29,20 @@ SHARES = np.linspace(0, 1, 21)
 
 
 def test_utilisation_pools_the_samples_of_all_seeds(source: Path) -> None:
-    study = gather(source)
+    study = read(source)
     use = Utilisation(study).of("quadruped:cheetah", "speed")
     assert use is not None
-    assert (
-        use.samples.counts["knee", "speed"].sum() == use.samples.plane["knee"].sum() == 3 * 20_000
-    )
+    assert use.samples.bins["knee"]["speed"].sum() == use.samples.plane["knee"].sum() == 3 * 20_000
     assert use.limiting is not None
     assert use.limiting[:4] == ("knee", "speed", 3, 3)
-    assert use.shares["knee", "speed"] == percentile(use.samples.counts["knee", "speed"])
+    assert use.shares["knee", "speed"] == percentile(use.samples.bins["knee"]["speed"])
     assert use.limiting.value == pytest.approx(0.83)
 
 
 def test_a_table_may_say_that_no_actuator_limits(
     source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = gather(source)
+    study = read(source)
     used = Utilisation(study)
     table = utilisation(study, used)
     assert table is not None
@@ -78,7 +76,7 @@ def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(tmp_path
     place = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking"
     for name in ("utilisation.parquet", "occupancy.parquet"):
         (place / name).write_bytes(b"PAR1")
-    study = gather(folder)
+    study = read(folder)
     used = Utilisation(study)
     use = used.of("quadruped:cheetah", "speed")
     told = json.loads((place / "summary.json").read_text())["utilisation"]["speed"]
@@ -92,7 +90,7 @@ def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(tmp_path
 
 def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> None:
     folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
-    study = gather(folder)
+    study = read(folder)
     used = Utilisation(study)
     use = used.of("quadruped:cheetah", "speed")
     assert use is not None
@@ -115,14 +113,14 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> N
 
 def test_a_corner_is_drawn_where_the_motor_has_it(tmp_path: Path) -> None:
     folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
-    study = gather(folder)
+    study = read(folder)
     (robot,) = study.members.values()
     knees = [k for k, place in enumerate(robot.joint_classes) if robot.classes[place] == "knee"]
     speeds = [0.5 * speed if k in knees else 0.0 for k, speed in enumerate(robot.no_load_speed)]
     cornered = replace(robot, corner_speed=tuple(speeds))
-    runs = tuple(replace(one, members=(cornered,)) for one in study.singles)
-    study = replace(study, singles=runs)
-    found = plane.shown(study, Utilisation(gather(folder)), "speed")
+    runs = [one.model_copy(update={"members": (cornered,)}) for one in study.runs]
+    study = replace(study, runs=tuple(runs))
+    found = plane.shown(study, Utilisation(read(folder)), "speed")
     figure = plane.figure(study, "speed", found, 7.0)
     stated = {"peak_torque": 60.0, "no_load_speed": 20.0}
     straight, motor = size("leg", stated, None), size("leg", stated | {"corner_speed": 10.0}, None)
@@ -149,7 +147,7 @@ def test_counts_that_make_no_sense_are_omitted_or_kept_at_the_end(
     table = parquet.read_table(path)
     at = table.schema.get_field_index(column)
     parquet.write_table(table.set_column(at, column, [[value] * table.num_rows]), path)
-    study = gather(folder)
+    study = read(folder)
     use = Utilisation(study).of("quadruped:cheetah", "speed")
     assert use is not None
     assert [words in warning for warning in study.warnings] == [True] * bool(words)

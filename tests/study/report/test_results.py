@@ -17,7 +17,8 @@ pytest.importorskip("pyarrow")
 from PIL import Image
 
 from draft.cli import BAD_INPUT, main
-from draft.study.report import collected as files
+from draft.cli.display.results import commands
+from draft.study.report import folder as files
 from draft.study.report import writing
 from draft.study.report.collect import collect
 from draft.study.report.figures import shrink
@@ -48,9 +49,10 @@ kick/√(gL)  perturbed inertia  bear > cheetah   > 99 %             2
 
 
 def text_of(folder: Path, page: Path) -> str:
-    study = files.read(folder)
+    study = files.read(folder, results=True)
     used = Utilisation(study)
-    contents = Contents(study, all_tables(study, used), {}, Source(folder, page, {}))
+    source = Source(folder, page, {}, commands(study, folder, page, ()))
+    contents = Contents(study, all_tables(study, used), {}, source)
     return markdown(contents.page(), page.parent)
 
 
@@ -92,8 +94,9 @@ def test_the_page_is_written_with_small_figures_and_again_the_same(
     page = Path("docs/results.md")
     (tmp_path / "docs/images/results").mkdir(parents=True)
     (tmp_path / "docs/images/results/old.png").write_bytes(b"")
-    study = files.read(collected)
-    found = write_page(study, collected, page)
+    study = files.read(collected, results=True)
+    lines = commands(study, collected, page, ())
+    found = write_page(study, collected, page, lines)
     first = {path: path.read_bytes() for path in found}
     assert all(len(data) < 100_000 for path, data in first.items() if path.suffix == ".png")
     links = re.findall(r"!\[[^]]+\]\(([^)]+)\)", page.read_text())
@@ -101,7 +104,7 @@ def test_the_page_is_written_with_small_figures_and_again_the_same(
     assert {path.name for path in Path("docs/images/results").iterdir()} == {
         path.name for path in found[1:]
     }
-    assert {path: path.read_bytes() for path in write_page(study, collected, page)} == first
+    assert {path: path.read_bytes() for path in write_page(study, collected, page, lines)} == first
     assert str(tmp_path) not in page.read_text()
 
 
@@ -152,6 +155,13 @@ def test_a_page_that_is_no_markdown_is_refused(
 ) -> None:
     assert main(["study", "results", str(collected), "--write", "page.html"]) == BAD_INPUT
     assert "is not a Markdown file" in capsys.readouterr().err
+
+
+def test_a_studys_own_folder_is_to_be_collected_first(
+    source: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["study", "results", str(source)]) == BAD_INPUT
+    assert f"'draft study collect {source} --out DIR'" in capsys.readouterr().err
 
 
 def test_results_that_are_not_there_are_explained(
