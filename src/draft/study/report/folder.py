@@ -27,7 +27,7 @@ from draft.learn.training import progress
 from draft.learn.training.members import robots_digest
 from draft.learn.training.run import is_run, open_run, read_record, safe
 from draft.study.report import samples
-from draft.study.report.records import Key, Measured, Planned, Record, Study, Trained, levels_of
+from draft.study.report.records import Key, Outcome, Planned, Record, Study, Trained, levels_of
 from draft.study.store import DONE, FAILED
 from draft.study.store import STATE as STUDY
 
@@ -49,7 +49,7 @@ class StageFile(Record):
 class StudyFile(Record):
     """Content that all runs share."""
 
-    format: Literal[1] = 1
+    format: Literal[1]
     name: str
     planned: Planned | None
     stages: dict[str, StageFile]
@@ -61,12 +61,15 @@ def read(folder: Path, results: bool = False) -> Study:
 
     Args:
         folder: folder of the study, any folder of runs in `runs/`, or collected results.
-        results: whether these must be collected results, complete and sound. Otherwise what cannot
-            be read is omitted, and listed in `Study.warnings`.
+        results: whether these must be collected results.
+
+    Returns:
+        The study. Runs and evaluations that cannot be read where they were made are omitted, and
+        listed in `Study.warnings`.
 
     Raises:
-        DraftError: there is no run that can be read, or the extra that reads Parquet is not
-            installed.
+        DraftError: there is no run that can be read, a file of collected results is damaged, or
+            the extra that reads Parquet is not installed.
     """
     paths = sorted(path for path in (folder / RUNS).glob("*") if is_run(path))
     if results and paths:
@@ -149,6 +152,7 @@ def _trained(folder: Path, planned: Planned | None) -> Trained:
     columns = dict.fromkeys(name for row in rows for name in row)
     versions = read_record(folder).get("versions")
     return Trained(
+        format=1,
         run=folder.name,
         design=run.plan.members[0].name,
         stage=stage,
@@ -184,8 +188,8 @@ def _kept(found: Iterable[Trained], warnings: list[str]) -> list[Trained]:
     return kept
 
 
-def _evaluations(folder: Path, run: Trained, warnings: list[str]) -> dict[str, Measured]:
-    found: dict[str, Measured] = {}
+def _evaluations(folder: Path, run: Trained, warnings: list[str]) -> dict[str, Outcome]:
+    found: dict[str, Outcome] = {}
     for path in sorted((folder / "evaluation").glob("*/summary.json")):
         where = "/".join(path.parts[-4:])
         try:
@@ -196,7 +200,7 @@ def _evaluations(folder: Path, run: Trained, warnings: list[str]) -> dict[str, M
         if summary.robots not in (None, run.robots):
             warnings.append(f"{where} is of other robots than its run; it is omitted")
             continue
-        one = Measured(summary=summary, samples={})
+        one = Outcome(summary=summary, samples={})
         if run.single and summary.arm == "nominal":  # Pages show no other counts.
             one.samples.update(samples.read(path.parent, levels_of(summary), warnings))
         found[one.name] = one
@@ -214,6 +218,7 @@ def texts(study: Study) -> dict[str, str]:
     """
     stages = {s: one.plan for s in STAGES for one in study.singles if one.stage == s}
     shared = StudyFile(
+        format=1,
         name=study.name,
         planned=study.planned,
         stages={
@@ -229,7 +234,7 @@ def texts(study: Study) -> dict[str, str]:
         found[f"{DESIGNS}/{safe(name)}.json"] = dumps(numbers)
     for one in study.singles:
         data = one.model_dump(mode="json", by_alias=True, exclude_unset=True, exclude=_REPEATED)
-        found[f"{RUNS}/{one.name}.json"] = dumps({"format": one.format, **data})
+        found[f"{RUNS}/{one.name}.json"] = dumps(data)
     return found
 
 

@@ -34,8 +34,7 @@ def _cut(counts: Array) -> list[int]:
 
 
 def _cells(rows: Sequence[Sequence[int]]) -> Array:
-    padded = [*rows, *[[]] * (CELLS - len(rows))]
-    return np.array([_filled(row, CELLS) for row in padded])[:CELLS]
+    return np.array([_filled(row, CELLS) for row in rows]).reshape(CELLS, CELLS)
 
 
 def _stored(integers: core_schema.CoreSchema, read: Any, write: Any) -> GetPydanticSchema:
@@ -80,7 +79,7 @@ class Samples(Record):
             self.plane[joint] = self.plane.get(joint, 0) + cells
 
 
-class Measured(Record):
+class Outcome(Record):
     """Summary of an evaluation, with its counted samples by test.
 
     There are samples of the nominal arm of one design.
@@ -116,7 +115,7 @@ class Trained(Record):
         plan: what all runs of its stage share, see `run.Plan.record`.
     """
 
-    format: Literal[1] = 1
+    format: Literal[1]
     name: str = Field(alias="run")
     design: str
     stage: StageName
@@ -129,7 +128,7 @@ class Trained(Record):
     processes: int | None
     versions: dict[str, str]
     curve: dict[str, list[float | None]]
-    evaluations: dict[str, Measured]
+    evaluations: dict[str, Outcome]
     members: Annotated[tuple[LeggedRobot, ...], PlainValidator(tuple)] = Field((), exclude=True)
     plan: dict[str, Any] = Field({}, exclude=True)
 
@@ -175,7 +174,7 @@ class Trained(Record):
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """One arm and protocol of a run's evaluation; see `Measured`."""
+    """One arm and protocol of a run's evaluation; see `Outcome`."""
 
     run: Trained
     summary: Summary
