@@ -201,7 +201,7 @@ def _evaluations(folder: Path, run: Trained, warnings: list[str]) -> dict[str, O
             warnings.append(f"{where} is of other robots than its run; it is omitted")
             continue
         one = Outcome(summary=summary, samples={})
-        if run.single and summary.arm == "nominal":  # Pages show no other counts.
+        if run.single and one.arm == "nominal":  # Pages show no other counts.
             one.samples.update(samples.read(path.parent, levels_of(summary), warnings))
         found[one.name] = one
     return dict(sorted(found.items()))

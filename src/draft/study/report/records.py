@@ -89,9 +89,19 @@ class Outcome(Record):
     samples: dict[str, Samples]
 
     @property
+    def arm(self) -> Arm:
+        """Arm: "nominal" or "perturbed"."""
+        return self.summary.arm
+
+    @property
+    def protocol(self) -> Protocol:
+        """Protocol: "walking" or "published"."""
+        return self.summary.protocol
+
+    @property
     def name(self) -> str:
         """Name of its folder within the run."""
-        return f"{self.summary.arm}-{self.summary.protocol}"
+        return f"{self.arm}-{self.protocol}"
 
 
 class Trained(Record):
@@ -172,28 +182,10 @@ class Trained(Record):
         return len(self.members) == 1
 
 
-@dataclass(frozen=True, eq=False)
-class Evaluation:
-    """One arm and protocol of a run's evaluation; see `Outcome`."""
+class Evaluation(Outcome):
+    """One arm and protocol of a run's evaluation, with the run."""
 
     run: Trained
-    summary: Summary
-    samples: Mapping[str, Samples]
-
-    @property
-    def arm(self) -> Arm:
-        """Arm: "nominal" or "perturbed"."""
-        return self.summary.arm
-
-    @property
-    def protocol(self) -> Protocol:
-        """Protocol: "walking" or "published"."""
-        return self.summary.protocol
-
-    @property
-    def name(self) -> str:
-        """Name of its folder within the run."""
-        return f"{self.arm}-{self.protocol}"
 
 
 def levels_of(summary: Summary) -> dict[str, float]:
@@ -272,7 +264,7 @@ class Study:
     def evaluations(self) -> tuple[Evaluation, ...]:
         """Evaluations of the runs, by name."""
         return tuple(
-            Evaluation(run, one.summary, one.samples)
+            Evaluation(run=run, summary=one.summary, samples=one.samples)
             for run in sorted(self.runs, key=lambda run: run.name)
             for one in run.evaluations.values()
         )
