@@ -160,6 +160,7 @@ def test_no_ratio_is_printed_against_a_part_of_the_mass(
     assert record["inertia_error_percent"]["median"] is None
 
 
+@pytest.mark.slow
 def test_a_robot_of_unknown_mass_does_not_count_among_many(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -174,6 +175,7 @@ def test_a_robot_of_unknown_mass_does_not_count_among_many(
     assert main(["twin", "--all", "many", "--workers", "1", "--out", "figures"]) == 0
 
 
+@pytest.mark.slow
 def test_a_figure_of_a_twin_without_known_masses_is_drawn() -> None:
     pytest.importorskip("matplotlib")
     path = model(SHAPE.format("") + '<geom size=".01"/>', mesh=False)

@@ -176,6 +176,7 @@ def test_a_robot_that_the_policy_cannot_drive_ends_a_sweep_before_it_begins(
     assert not out.exists()
 
 
+@pytest.mark.slow
 @needs_learning
 @pytest.mark.parametrize("policy", [None, str(FAMILY)])
 def test_the_shipped_policy_measures_a_design_and_knows_its_region(policy: str | None) -> None:
@@ -191,6 +192,7 @@ def test_the_shipped_policy_measures_a_design_and_knows_its_region(policy: str |
     assert (np.asarray(found["learned.cost_of_transport"])[:2] > 0).all()
 
 
+@pytest.mark.slow
 @needs_learning
 def test_one_design_has_floats_and_a_refused_one_has_none() -> None:
     pytest.importorskip("mjlab")

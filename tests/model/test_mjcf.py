@@ -18,16 +18,7 @@ from hypothesis import strategies as st
 
 import draft
 from tests.helpers import DRIVE, leg, robot
-from tests.model.test_masses import SHIPPED
 from tests.written import edit, write_robot
-
-
-@pytest.fixture(
-    params=SHIPPED, ids=lambda pair: f"{pair[0]}-{pair[1] or 'default'}", scope="module"
-)
-def model(request: pytest.FixtureRequest) -> draft.Model:
-    name, label = request.param
-    return draft.load(name).resolve(label).build()
 
 
 def test_every_joint_has_the_numbers_of_the_design(model: draft.Model) -> None:

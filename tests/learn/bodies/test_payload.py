@@ -40,16 +40,11 @@ def test_the_block_is_that_of_the_design_with_a_payload(label: str) -> None:
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12, err_msg=field)
 
 
-def test_nothing_else_changes_and_no_mass_is_no_block() -> None:
+def test_nothing_else_changes_and_a_second_payload_has_a_name_of_its_own() -> None:
     (robot,) = with_payload([member()], 10)
     assert replace(robot, block=(), mass=member().mass) == member()
-    assert with_payload([member()], 0) == (member(),)
-
-
-def test_a_second_payload_has_a_name_of_its_own() -> None:
     trained = legged_robot(draft.load("quadruped").resolve("cheetah", {"payload": 3}))
-    (robot,) = with_payload([trained], 4)
-    model = model_spec(robot).compile()
+    model = model_spec(with_payload([trained], 4)[0]).compile()
     assert model.body("payload").mass[0] == pytest.approx(3)
     assert model.body("payload_").mass[0] == pytest.approx(4)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from draft.study.report.blocks import Page
 from draft.study.report.folder import read
@@ -12,9 +11,6 @@ from draft.study.report.occupancy import Utilisation
 from draft.study.report.sections import Contents
 from draft.study.report.table import Table
 from draft.study.report.tables import all_tables
-
-BASE_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("base",)}
-SPEED_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("velocity",)}
 
 
 def tables_of(folder: Path) -> dict[str, Table]:

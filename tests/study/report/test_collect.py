@@ -88,17 +88,6 @@ def test_evaluations_of_an_older_draft_are_read_by_their_older_words(tmp_path: P
     assert files.texts(files.read(old))[RUN] == files.texts(files.read(new))[RUN]
 
 
-def test_collecting_again_changes_no_byte(source: Path, tmp_path: Path) -> None:
-    out = tmp_path / "three"
-    first = collect(source, out)
-    before = contents(out)
-    again = collect(source, out)
-    assert first.written
-    assert not again.written
-    assert (again.new, again.changed) == ((), ())
-    assert contents(out) == before
-
-
 @pytest.mark.parametrize("name", ["three_quadrupeds", "paper"])
 def test_results_in_the_repository_are_written_as_they_are_read(name: str) -> None:
     folder = Path(__file__).parents[3] / "examples/results" / name
@@ -145,8 +134,14 @@ def test_what_comes_in_later_is_added(source: Path, tmp_path: Path) -> None:
     assert len(second.new) == 13
     assert second.changed == ("bear-push-1",)
     assert second.missing == ()
-    collect(source, tmp_path / "at_once")
-    assert contents(out) == contents(tmp_path / "at_once")
+    at_once = tmp_path / "at_once"
+    assert collect(source, at_once).written
+    before = contents(at_once)
+    assert contents(out) == before
+    # Collecting again changes no byte.
+    again = collect(source, at_once)
+    assert (again.written, again.new, again.changed) == (False, (), ())
+    assert contents(at_once) == before
 
 
 def test_parts_of_a_study_from_two_machines_go_together(tmp_path: Path) -> None:
@@ -175,15 +170,6 @@ def test_an_evaluation_that_is_done_again_stays_until_it_is_replaced(tmp_path: P
     summary = place / "summary.json"
     summary.write_text(summary.read_text().replace('"replicas": 256', '"replicas": 64'))
     assert collect(folder, out).changed == ("cheetah-velocity-0",)
-
-
-def test_an_evaluation_of_another_checkpoint_is_omitted(tmp_path: Path) -> None:
-    run = synthetic.trained(tmp_path, "cheetah", "push", 0)
-    synthetic.evaluated(run, change=lambda summary: summary.update(iteration=700))
-    done = collect(tmp_path, tmp_path / "out")
-    words = "cheetah-push-0, nominal-walking: the evaluation is of iteration 700, not 1500"
-    assert words in done.omitted
-    assert done.study.evaluations == ()
 
 
 def test_a_run_of_another_plan_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
@@ -224,13 +210,6 @@ def test_another_robot_of_the_same_name_is_refused(tmp_path: Path) -> None:
         collect(other, out)
 
 
-def test_a_folder_of_something_else_is_kept(source: Path, tmp_path: Path) -> None:
-    (tmp_path / "letter.txt").write_text("dear")
-    with pytest.raises(DraftError, match="does not hold results of a study; it is kept"):
-        collect(source, tmp_path)
-    assert contents(tmp_path) == {"letter.txt": b"dear"}
-
-
 def test_strips_beside_the_results_stay(tmp_path: Path) -> None:
     folder = synthetic.study(tmp_path / "study", **SMALL)
     out = tmp_path / "out"
@@ -243,13 +222,18 @@ def test_strips_beside_the_results_stay(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"study", "out"}
 
 
-def test_families_are_omitted(tmp_path: Path) -> None:
-    synthetic.study(tmp_path / "s", **SMALL)
-    synthetic.family(tmp_path / "s", lambda thigh, ratio: 2.0)
-    done = collect(tmp_path / "s", tmp_path / "out")
-    words = "family-velocity-0 is of a family; only single designs are collected"
-    assert words in done.omitted
-    assert [one.name for one in done.study.singles] == ["cheetah-velocity-0"]
+def test_families_and_evaluations_of_another_checkpoint_are_omitted(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "s", **SMALL)
+    synthetic.family(folder, lambda thigh, ratio: 2.0)
+    run = synthetic.trained(folder, "cheetah", "push", 0)
+    synthetic.evaluated(run, change=lambda summary: summary.update(iteration=700))
+    done = collect(folder, tmp_path / "out")
+    assert set(done.omitted) == {
+        "family-velocity-0 is of a family; only single designs are collected",
+        "cheetah-push-0, nominal-walking: the evaluation is of iteration 700, not 1500",
+    }
+    assert {one.name for one in done.study.singles} == {"cheetah-velocity-0", "cheetah-push-0"}
+    assert {one.run.name for one in done.study.evaluations} == {"cheetah-velocity-0"}
 
 
 def test_a_study_without_a_finished_run_is_explained(tmp_path: Path) -> None:
@@ -294,15 +278,16 @@ def test_a_broken_file_is_named(tmp_path: Path, file: str, change: Any, words: s
         collect(source, out)
 
 
-def test_a_studys_own_folder_is_not_taken_for_results(source: Path) -> None:
+def test_folders_without_results_are_explained_and_kept(source: Path, tmp_path: Path) -> None:
     with pytest.raises(DraftError) as refused:
         files.read(source, results=True)
     said = str(refused.value)
     assert "is the folder of a study, whose results are not collected yet" in said
     assert f'`draft.study.collect("{source}", out="DIR")`' in said
     assert "delete" not in said
-
-
-def test_a_folder_without_results_is_explained(tmp_path: Path) -> None:
     with pytest.raises(DraftError, match="holds no results of a study"):
         files.read(tmp_path, results=True)
+    (tmp_path / "letter.txt").write_text("dear")
+    with pytest.raises(DraftError, match="does not hold results of a study; it is kept"):
+        collect(source, tmp_path)
+    assert contents(tmp_path) == {"letter.txt": b"dear"}
