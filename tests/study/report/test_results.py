@@ -142,11 +142,13 @@ def test_results_are_printed_as_tables(tmp_path: Path, command: Command) -> None
 
 
 def test_results_or_a_page_that_cannot_be_are_refused(
-    collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
+    source: Path, collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     monkeypatch.chdir(tmp_path)
     err = command.refuses(f"study results {collected} --write page.html")
     assert "is not a Markdown file" in err
+    err = command.refuses(f"study results {source}")
+    assert f"'draft study collect {source} --out DIR'" in err
     err = command.refuses("study results")
     assert "'examples/results/three_quadrupeds' holds no results" in err
 
