@@ -31,7 +31,7 @@ BUDGET = {
     "spec": 4_510,
     "studio": 2_720,
     "study": 6_600,
-    "twins": 1_570,
+    "twins": 1_590,
     "variation": 350,
 }
 

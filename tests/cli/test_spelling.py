@@ -29,6 +29,7 @@ def training() -> Iterator[None]:
         ("omit `checkpoint`, or `designs`", "omit `checkpoint`, or `designs`"),
         ("`draft.train` made it", "'draft train' made it"),
         ("`draft.evaluate(RUN)`", "'draft evaluate RUN'"),
+        ('`draft.study.collect("a", out="DIR")`', "'draft study collect a --out DIR'"),
         (
             '`draft.train("my runs/a", iterations=300)` continues',
             "'draft train 'my runs/a' --iterations 300' continues",

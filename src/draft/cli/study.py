@@ -132,10 +132,10 @@ def results(
 ) -> int:
     """Print collected results: each skill over seeds in both arms, with its provenance."""
     from draft.cli.display.results import print_json, print_tables, write_page
-    from draft.study.report.collected import read
+    from draft.study.report.folder import read
 
-    study = read(Path(folder))
-    others = {Path(other): read(Path(other)) for other in against}
+    study = read(Path(folder), results=True)
+    others = {Path(other): read(Path(other), results=True) for other in against}
     if write is not None:
         write_page(study, Path(folder), Path(write), others)
     elif json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from draft.study.report.blocks import Page
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.html import html
 from draft.study.report.occupancy import Utilisation
 from draft.study.report.sections import Contents
@@ -14,13 +14,13 @@ from draft.study.report.tables import all_tables
 
 
 def tables_of(folder: Path) -> dict[str, Table]:
-    study = gather(folder)
+    study = read(folder)
     return all_tables(study, Utilisation(study))
 
 
 def page_of(folder: Path) -> str:
     """The page without figures."""
-    study = gather(folder)
+    study = read(folder)
     used = Utilisation(study)
     return html(Contents(study, all_tables(study, used), {}).page())
 

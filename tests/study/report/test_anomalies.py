@@ -14,7 +14,7 @@ pytest.importorskip("pyarrow")
 from draft.learn.bodies.legged import CLASSES
 from draft.learn.measuring.utilisation import CELL, CELLS
 from draft.study.report import anomalies
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.records import Samples
 from draft.study.report.run_tables import remarks
 from tests.learn import synthetic
@@ -39,7 +39,7 @@ def test_a_seed_that_does_not_walk_is_named(
     one_run(tmp_path, "base", lambda s: s["tests"]["walk"].update(change))
     one_run(tmp_path, "base", None, seed=1)
     said = [f"cheetah, seed 0, did not learn to walk: {words}."]
-    assert anomalies.anomalies(gather(tmp_path)) == said
+    assert anomalies.anomalies(read(tmp_path)) == said
 
 
 def test_a_design_that_cannot_climb_is_named(tmp_path: Path) -> None:
@@ -49,11 +49,11 @@ def test_a_design_that_cannot_climb_is_named(tmp_path: Path) -> None:
 
     for seed in (0, 1):
         one_run(tmp_path, "terrain", change, seed)
-    (said,) = anomalies.not_climbing(gather(tmp_path))
+    (said,) = anomalies.not_climbing(read(tmp_path))
     assert said.startswith("cheetah cannot climb (nominal, seeds 0, 1)")
     assert "0.05 m" in said
     one_run(tmp_path, "terrain", None, 2)
-    assert list(anomalies.not_climbing(gather(tmp_path))) == []
+    assert list(anomalies.not_climbing(read(tmp_path))) == []
 
 
 @pytest.mark.parametrize(("speeds", "named"), [((3.0, 3.4, 3.7), False), ((3.0, 3.4, 3.9), True)])
@@ -62,7 +62,7 @@ def test_a_top_speed_that_varies_much_is_named(
 ) -> None:
     for seed, speed in enumerate(speeds):
         one_run(tmp_path, "velocity", lambda s, v=speed: s["scalars"].update(top_speed=v), seed)
-    said = list(anomalies.varying(gather(tmp_path)))
+    said = list(anomalies.varying(read(tmp_path)))
     assert len(said) == named
     assert not named or "ranges over 26 % of its median (3.00 to 3.90 m/s, 3 seeds)" in said[0]
 
@@ -70,10 +70,10 @@ def test_a_top_speed_that_varies_much_is_named(
 def working_at(folder: Path, torque: float, speed: float, eta: float) -> Any:
     """A study whose joints all work at one torque and speed, per limit."""
     one_run(folder, "velocity", lambda s: s["scalars"].update(eta=eta))
-    study = gather(folder)
+    study = read(folder)
     cells = np.zeros((CELLS, CELLS))
     cells[int(torque / CELL), int(speed / CELL)] = 1000
-    found = {"speed": Samples({}, dict.fromkeys(CLASSES, cells))}
+    found = {"speed": Samples.model_validate({"plane": dict.fromkeys(CLASSES, cells)})}
     object.__setattr__(study.evaluations[0], "samples", found)
     return study
 
@@ -98,7 +98,7 @@ def test_a_skill_that_errors_make_better_in_every_seed_is_named(tmp_path: Path) 
         run = synthetic.trained(tmp_path, "cheetah", "push", seed)
         synthetic.evaluated(run, "nominal", change=lambda s: s["scalars"].update(kick=2.0))
         synthetic.evaluated(run, "perturbed", change=lambda s: s["scalars"].update(kick=2.5))
-    (said,) = anomalies.anomalies(gather(tmp_path))
+    (said,) = anomalies.anomalies(read(tmp_path))
     assert said == (
         "cheetah's kick is better with inertia errors than without, in every seed: at least "
         "2.50 m/s against at most 2.00 m/s."
@@ -119,6 +119,6 @@ def test_evaluations_with_other_inertia_errors_than_most_are_flagged(tmp_path: P
     synthetic.evaluated(run, "perturbed", change=lambda summary: summary.update(errors="paper"))
     words = "published errors, where others have errors of the twins of Go2 and B2"
     said = f"bear, push, perturbed inertia, seed 2: {words}: not to be compared"
-    assert remarks(gather(folder)) == [said]
+    assert remarks(read(folder)) == [said]
     (row,) = tables_of(folder)["evaluations"].rows
     assert row[2] == "2 nominal, 1 perturbed (paper), 2 perturbed (twins)"

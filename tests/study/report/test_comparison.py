@@ -13,7 +13,7 @@ pytest.importorskip("pyarrow")
 from draft.errors import DraftError
 from draft.study.report.collect import collect
 from draft.study.report.comparison import comparison
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.records import Study
 from draft.study.report.spread import Spread
 from tests.commands import Command
@@ -47,11 +47,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def main(folder: Path) -> Study:
-    return gather(folder)
+    return read(folder)
 
 
 def test_only_designs_seeds_and_skills_in_common_are_compared(main: Study, tmp_path: Path) -> None:
-    made = comparison(main, gather(faster(tmp_path / "other", {"cheetah": 1.25, "bear": 0.5})))
+    made = comparison(main, read(faster(tmp_path / "other", {"cheetah": 1.25, "bear": 0.5})))
     cells = {(row[0], row[1]): row[2:] for row in made.rows}
     skills = ("top speed [m/s]", "efficiency η")
     assert list(cells) == [(skill, design) for skill in skills for design in DESIGNS]
@@ -82,7 +82,7 @@ def test_results_of_one_name_have_columns_of_their_own(main: Study) -> None:
 def test_it_is_said_whether_the_order_of_the_designs_is_the_same(
     by: dict[str, float], words: str, main: Study, tmp_path: Path
 ) -> None:
-    made = comparison(main, gather(faster(tmp_path / "other", by)))
+    made = comparison(main, read(faster(tmp_path / "other", by)))
     assert f"top speed: {words}" in made.notes
 
 
@@ -92,7 +92,7 @@ def test_a_policy_of_the_other_study_that_does_not_walk_is_named(
     other = faster(tmp_path / "other", {"cheetah": 0.01})
     run = synthetic.trained(other, "cheetah", "base", 0)
     synthetic.evaluated(run, change=lambda s: s["tests"]["walk"].update(speed=[0.0]))
-    (said,) = [note for note in comparison(main, gather(other)).notes if "walk" in note]
+    (said,) = [note for note in comparison(main, read(other)).notes if "walk" in note]
     assert said.startswith("other: cheetah, seed 0, did not learn to walk")
 
 
@@ -105,7 +105,7 @@ def test_a_design_without_the_skill_in_the_other_study_is_named_with_the_reason(
 
     other = faster(tmp_path / "other", {"bear": 1.0})
     synthetic.evaluated(synthetic.trained(other, "cheetah", "velocity", 0), change=change)
-    made = comparison(main, gather(other))
+    made = comparison(main, read(other))
     why = "seed 0: fewer than 80 % stay up at any command"
     assert f"cheetah has no top speed in other: {why}" in made.notes
     assert ("top speed [m/s]", "cheetah") not in [tuple(row[:2]) for row in made.rows]
@@ -119,14 +119,14 @@ def test_the_choices_that_differ_are_named(main: Study, tmp_path: Path) -> None:
         told["config"]["physics"]["timestep"] = 0.001
         told["environments"] = 512
         file.write_text(json.dumps(told))
-    said = comparison(main, gather(other)).caption
+    said = comparison(main, read(other)).caption
     assert "recipe paper instead of laptop" in said
     assert "512 instead of 4096 worlds in stage velocity" in said
     assert "physics.timestep 0.001 instead of 0.005" in said
 
 
 def test_studies_without_anything_in_common_are_refused(main: Study, tmp_path: Path) -> None:
-    other = gather(faster(tmp_path / "other", {"giraffe": 1.0}))
+    other = read(faster(tmp_path / "other", {"giraffe": 1.0}))
     words = "'other' has no skill of a design and seed in common with 'main'\n.*quadruped:bear"
     with pytest.raises(DraftError, match=words):
         comparison(main, other)

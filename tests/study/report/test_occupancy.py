@@ -19,7 +19,7 @@ from pyarrow import parquet
 from draft.design.actuators import size
 from draft.learn.measuring.utilisation import CELL, CELLS
 from draft.study.report import figures, plane
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.occupancy import Utilisation, percentile
 from draft.study.report.table import Table
 from draft.study.report.tables import utilisation
@@ -36,20 +36,18 @@ def speed_of(used: Utilisation) -> Any:
 
 
 def test_utilisation_pools_the_samples_of_all_seeds(source: Path) -> None:
-    study = gather(source)
+    study = read(source)
     use = speed_of(Utilisation(study))
-    assert (
-        use.samples.counts["knee", "speed"].sum() == use.samples.plane["knee"].sum() == 3 * 20_000
-    )
+    assert use.samples.bins["knee"]["speed"].sum() == use.samples.plane["knee"].sum() == 3 * 20_000
     assert use.limiting[:4] == ("knee", "speed", 3, 3)
-    assert use.shares["knee", "speed"] == percentile(use.samples.counts["knee", "speed"])
+    assert use.shares["knee", "speed"] == percentile(use.samples.bins["knee"]["speed"])
     assert use.limiting.value == pytest.approx(0.83)
 
 
 def test_a_table_may_say_that_no_actuator_limits(
     source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = gather(source)
+    study = read(source)
     used = Utilisation(study)
 
     def shown() -> Table:
@@ -84,7 +82,7 @@ def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(one: Pat
     place = one / "runs/cheetah-velocity-0/evaluation/nominal-walking"
     for name in ("utilisation.parquet", "occupancy.parquet"):
         (place / name).write_bytes(b"PAR1")
-    study = gather(one)
+    study = read(one)
     used = Utilisation(study)
     use = speed_of(used)
     told = json.loads((place / "summary.json").read_text())["utilisation"]["speed"]
@@ -96,7 +94,7 @@ def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(one: Pat
 
 
 def test_samples_are_drawn_where_their_torque_and_speed_are(one: Path) -> None:
-    study = gather(one)
+    study = read(one)
     used = Utilisation(study)
     use = speed_of(used)
     use.samples.plane["knee"] = np.zeros((CELLS, CELLS))
@@ -117,14 +115,14 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(one: Path) -> None:
 
 
 def test_a_corner_is_drawn_where_the_motor_has_it(one: Path) -> None:
-    study = gather(one)
+    study = read(one)
     (robot,) = study.members.values()
     knees = [k for k, place in enumerate(robot.joint_classes) if robot.classes[place] == "knee"]
     speeds = [0.5 * speed if k in knees else 0.0 for k, speed in enumerate(robot.no_load_speed)]
     cornered = replace(robot, corner_speed=tuple(speeds))
-    runs = tuple(replace(run, members=(cornered,)) for run in study.singles)
-    study = replace(study, singles=runs)
-    found = plane.shown(study, Utilisation(gather(one)), "speed")
+    runs = [run.model_copy(update={"members": (cornered,)}) for run in study.runs]
+    study = replace(study, runs=tuple(runs))
+    found = plane.shown(study, Utilisation(read(one)), "speed")
     figure = plane.figure(study, "speed", found, 7.0)
     stated = {"peak_torque": 60.0, "no_load_speed": 20.0}
     straight, motor = size("leg", stated, None), size("leg", stated | {"corner_speed": 10.0}, None)
@@ -150,7 +148,7 @@ def test_counts_that_make_no_sense_are_omitted_or_kept_at_the_end(
     table = parquet.read_table(path)
     at = table.schema.get_field_index(column)
     parquet.write_table(table.set_column(at, column, [[value] * table.num_rows]), path)
-    study = gather(one)
+    study = read(one)
     use = speed_of(Utilisation(study))
     assert [words in warning for warning in study.warnings] == [True] * bool(words)
     assert bool(use.samples.plane) == (not words)

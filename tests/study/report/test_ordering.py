@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 pytest.importorskip("pyarrow")
 
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.ordering import Ordering, by_chance, of_study, order
 from draft.study.report.tables import certainty
+from tests.learn import synthetic
 
 numbers = st.lists(st.integers(-50, 50).map(float), min_size=1, max_size=4)
 
@@ -87,8 +88,23 @@ def test_few_seeds_are_said_to_give_little_certainty() -> None:
 
 
 def test_a_studys_designs_are_ordered_by_their_medians(source: Path) -> None:
-    study = gather(source)
+    study = read(source)
     found = of_study(study, "nominal", "step")
     assert found is not None
     assert [name.partition(":")[2] for name in found.designs] == ["giraffe", "bear", "cheetah"]
     assert set(found.seeds.values()) == {3}
+
+
+def test_the_policy_that_ships_is_that_of_the_median_seed(source: Path, tmp_path: Path) -> None:
+    pytest.importorskip("onnx")
+    from scripts.ship_policies import median_seed
+
+    study = read(source)
+    for design in synthetic.DESIGNS:
+        speeds = {seed: synthetic.able(design, seed, "nominal")[0] for seed in (0, 1, 2)}
+        chosen = median_seed(study, f"quadruped:{design}")
+        assert chosen is not None
+        assert speeds[chosen] == statistics.median(speeds.values())
+    even = synthetic.study(tmp_path, ("cheetah",), (0, 1), ("nominal",), ("velocity",))
+    speeds = [synthetic.able("cheetah", seed, "nominal")[0] for seed in (0, 1)]
+    assert median_seed(read(even), "quadruped:cheetah") == speeds.index(min(speeds))

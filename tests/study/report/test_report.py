@@ -23,7 +23,7 @@ from matplotlib import pyplot as plt
 
 from draft.study.report import robots, tables, writing
 from draft.study.report.curves import PANELS, over_level, over_speed
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.labels import label_drops
 from draft.study.report.run_tables import remarks
 from draft.study.report.spread import Spread, Values
@@ -88,7 +88,7 @@ def test_the_report_is_written_whole_with_its_figures_and_tables_and_again_the_s
 def test_the_least_cost_of_transport_is_the_best_and_the_longest_range(
     source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = gather(source)
+    study = read(source)
     numbers = dict(zip(study.members, (2.0, 1.0, 3.0), strict=True))
     monkeypatch.setattr(tables, "by_seed", lambda _, name, *__: Values({0: numbers[name]}, {}))
     table = tables.capability(study, "energy")
@@ -150,7 +150,7 @@ def test_normalised_speed_is_per_root_of_g_and_leg_length(source: Path) -> None:
 
 
 def test_curves_are_medians_over_seeds_level_by_level(source: Path) -> None:
-    study = gather(source)
+    study = read(source)
     x, middle, low, high = over_level(study, "quadruped:bear", "perturbed", PANELS["push"])
     assert x.tolist() == synthetic.KICKS
     evaluations = list(study.of("quadruped:bear", "perturbed"))
@@ -163,7 +163,7 @@ def test_curves_are_medians_over_seeds_level_by_level(source: Path) -> None:
 
 
 def test_stairs_are_pooled_as_the_mean_of_up_and_down(source: Path) -> None:
-    one = next(e for e in gather(source).evaluations if "ascent" in e.summary.tests)
+    one = next(e for e in read(source).evaluations if "ascent" in e.summary.tests)
     up, down = (one.summary.tests[name].get("traversed", []) for name in ("ascent", "descent"))
     assert list(PANELS["stairs"].points(one.summary).values()) == [
         (a + b) / 2 for a, b in zip(up, down, strict=True)
@@ -171,7 +171,7 @@ def test_stairs_are_pooled_as_the_mean_of_up_and_down(source: Path) -> None:
 
 
 def test_efficiency_is_drawn_to_the_peak_command(source: Path) -> None:
-    speeds, *_ = over_speed(gather(source), "quadruped:cheetah", "nominal")
+    speeds, *_ = over_speed(read(source), "quadruped:cheetah", "nominal")
     assert len(speeds) == sum(level <= 5.0 for level in synthetic.SPEED)
 
 
@@ -242,7 +242,7 @@ def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) 
 def test_a_broken_summary_is_named_and_omitted(one: Path, text: str, words: str) -> None:
     path = one / "runs/cheetah-velocity-0/evaluation/nominal-walking/summary.json"
     path.write_text(text)
-    (warning,) = gather(one).warnings
+    (warning,) = read(one).warnings
     assert "cheetah-velocity-0/evaluation/nominal-walking/summary.json cannot be read" in warning
     assert words in warning
     assert "Omitted from this report" in page_of(one)
@@ -253,18 +253,18 @@ def test_a_broken_run_is_named_and_omitted_and_what_a_killed_process_left_is_non
 ) -> None:
     runs = one / "runs"
     shutil.copytree(runs / "cheetah-velocity-0", runs / ".cheetah-velocity-0-abcdefgh")
-    found = gather(one)
+    found = read(one)
     assert [run.name for run in found.singles] == ["cheetah-velocity-0"]
     assert found.warnings == ()
     bad = synthetic.trained(one, "bear", "base", 0)
     (bad.folder / "run.json").write_text("{")
-    study = gather(one)
+    study = read(one)
     assert list(study.titles.values()) == ["cheetah"]
     assert "bear-base-0' is broken" in study.warnings[0]
 
 
 def test_flags_are_reported_once_with_their_designs_arms_and_seeds(source: Path) -> None:
-    said = [words for words in remarks(gather(source)) if "velocity" in words and "bear" in words]
+    said = [words for words in remarks(read(source)) if "velocity" in words and "bear" in words]
     assert len(said) == 1
     assert "velocity, nominal and perturbed inertia, seeds 0, 1, 2: 7 m/s" in said[0]
 
@@ -359,4 +359,4 @@ def test_a_family_is_named_with_the_command_that_draws_it(tmp_path: Path) -> Non
     page = page_of(tmp_path)
     assert "4 members of families" in page
     assert "Runs of families: family-velocity-0." in page
-    assert "draft surface ROBOT --policy RUN" in page
+    assert "draft surface ROBOT" in page

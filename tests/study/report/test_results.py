@@ -15,7 +15,8 @@ pytest.importorskip("pyarrow")
 
 from PIL import Image
 
-from draft.study.report import collected as files
+from draft.cli.display.results import commands
+from draft.study.report import folder as files
 from draft.study.report import writing
 from draft.study.report.collect import collect
 from draft.study.report.figures import shrink
@@ -47,9 +48,10 @@ kick/√(gL)  perturbed inertia  bear > cheetah   > 99 %             2
 
 
 def text_of(folder: Path, page: Path) -> str:
-    study = files.read(folder)
+    study = files.read(folder, results=True)
     used = Utilisation(study)
-    contents = Contents(study, all_tables(study, used), {}, Source(folder, page, {}))
+    source = Source(folder, page, {}, commands(study, folder, page, ()))
+    contents = Contents(study, all_tables(study, used), {}, source)
     return markdown(contents.page(), page.parent)
 
 
@@ -95,8 +97,9 @@ def test_the_page_is_written_with_small_figures_and_again_the_same(
     page = Path("docs/results.md")
     (tmp_path / "docs/images/results").mkdir(parents=True)
     (tmp_path / "docs/images/results/old.png").write_bytes(b"")
-    study = files.read(collected)
-    found = write_page(study, collected, page)
+    study = files.read(collected, results=True)
+    lines = commands(study, collected, page, ())
+    found = write_page(study, collected, page, lines)
     first = {path: path.read_bytes() for path in found}
     assert all(len(data) < 100_000 for path, data in first.items() if path.suffix == ".png")
     links = re.findall(r"!\[[^]]+\]\(([^)]+)\)", page.read_text())
@@ -104,7 +107,7 @@ def test_the_page_is_written_with_small_figures_and_again_the_same(
     assert {path.name for path in Path("docs/images/results").iterdir()} == {
         path.name for path in found[1:]
     }
-    assert {path: path.read_bytes() for path in write_page(study, collected, page)} == first
+    assert {path: path.read_bytes() for path in write_page(study, collected, page, lines)} == first
     assert str(tmp_path) not in page.read_text()
 
 
@@ -139,11 +142,13 @@ def test_results_are_printed_as_tables(tmp_path: Path, command: Command) -> None
 
 
 def test_results_or_a_page_that_cannot_be_are_refused(
-    collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
+    source: Path, collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     monkeypatch.chdir(tmp_path)
     err = command.refuses(f"study results {collected} --write page.html")
     assert "is not a Markdown file" in err
+    err = command.refuses(f"study results {source}")
+    assert f"'draft study collect {source} --out DIR'" in err
     err = command.refuses("study results")
     assert "'examples/results/three_quadrupeds' holds no results" in err
 

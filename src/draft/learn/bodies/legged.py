@@ -63,6 +63,7 @@ class LeggedRobot:
             a corner.
         battery: energy of a stated battery, and the ends of its 90 % band [Wh]; () if the design
             states none.
+        block: half side and middle of a payload [m], which is not in the text; () without one.
     """
 
     name: str
@@ -87,6 +88,7 @@ class LeggedRobot:
     mirror_sign: tuple[float, ...]
     corner_speed: tuple[float, ...] = ()
     battery: tuple[float, ...] = ()
+    block: tuple[float, ...] = ()
 
     @property
     def xml(self) -> str:
@@ -154,7 +156,7 @@ class LeggedRobot:
 
 
 # Defaults of the fields that were added later: older records lack them.
-_LATER: dict[str, Any] = {"corner_speed": (), "battery": ()}
+_LATER: dict[str, Any] = {"corner_speed": (), "battery": (), "block": ()}
 
 
 def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:

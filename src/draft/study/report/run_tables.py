@@ -134,7 +134,7 @@ def provenance(study: Study) -> Table | None:
         groups.setdefault(_made(one, own, recipe), []).append(one)
     rows: list[list[Cell]] = [
         [
-            ", ".join(t for d, t in study.titles.items() if d in {one.key[0] for one in runs}),
+            ", ".join(t for d, t in study.titles.items() if d in {one.design for one in runs}),
             ", ".join(s for s in STAGES if s in {one.stage for one in runs}),
             ", ".join(map(str, sorted({one.seed for one in runs}))),
             len(runs),
