@@ -20,7 +20,8 @@ import tyro
 import draft
 from benchmarks.rows import measured, publish, timed
 from draft.learn.bodies.legged import legged_robot
-from draft.learn.measuring.levels import SECONDS, SkillTest, skill_tests
+from draft.learn.measuring.evaluation_options import RollOuts
+from draft.learn.measuring.levels import SkillTest, skill_tests
 from draft.learn.measuring.rollout.evaluate import evaluate
 from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.task.world.task import Task
@@ -44,7 +45,8 @@ def main(
     """
     device = device or ("cuda:0" if torch.cuda.is_available() else "cpu")
     gpu = device.startswith("cuda")
-    replicas, seconds = replicas or (256 if gpu else 2), seconds or (SECONDS if gpu else 0.5)
+    usual = RollOuts() if gpu else RollOuts(replicas=2, seconds=0.5)
+    replicas, seconds = replicas or usual.replicas, seconds or usual.seconds
     where = torch.cuda.get_device_name(device) if gpu else f"CPU ({platform.processor()})"
     rows, sums, peak = [], [0.0, 0.0], 0.0
     for word, stage in STAGES.items():

@@ -30,7 +30,16 @@ from benchmarks.rows import measured, publish, timed
 from draft.design.references import open_designs
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import NATIVE, WARP, cores
-from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SKILL_TESTS, SPEED, WALKING
+from draft.learn.measuring.evaluation_options import RollOuts
+from draft.learn.measuring.levels import (
+    ASCENT,
+    DESCENT,
+    PUSH,
+    SKILL_TESTS,
+    SPEED,
+    WALKING,
+    settle,
+)
 from draft.learn.measuring.levels import skill_tests as named
 from draft.learn.measuring.rollout.evaluate import evaluate, trained
 from draft.learn.measuring.rollout.review import Level, levels
@@ -241,7 +250,9 @@ def _tests(run: Run) -> list[dict[str, Any]]:
     rows, total = [], 0.0
     climber = open_run(run.folder.with_name(run.folder.name.replace("velocity", "terrain")))
     for words, who in ((("walk", "speed", "push"), run), (("stairs",), climber)):
-        trial = Trial(task_of(who.plan), named(words))
+        usual = RollOuts()
+        numbers = usual.replicas, usual.seconds, settle(usual.seconds)
+        trial = Trial(task_of(who.plan), named(words), *numbers)
         policy = trained(who, who.checkpoint()[0], "cpu")
         taken, _ = timed(lambda: evaluate(trial, policy, "cpu", engine=NATIVE, threads=cores()))  # noqa: B023
         total += taken

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +23,14 @@ prefer_offscreen()  # before MuJoCo is imported
 
 from draft.model.picture import Exhibit, Pixels, View, corners, draw, exhibit, stage  # noqa: E402
 from draft.spec.load import shipped  # noqa: E402
+from draft.study.report import figures  # noqa: E402
 
 IMAGES = Path(__file__).resolve().parent / "images"
 # A robot of a row turns this far from the camera [rad], and stands this far from the next [m].
 TURN = 0.80
 GAP = 0.10
-COLOURS = 256
+# Pictures of robots have more colours than figures.
+shrink = partial(figures.shrink, tints=256)
 ROW: View = (180, -12)
 SIDES: dict[str, View] = {
     "front": (180, 0),
@@ -94,19 +97,6 @@ def _save(pixels: Pixels, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     Image.fromarray(pixels).save(path)
     shrink(path)
-
-
-def shrink(path: Path, width: int | None = None) -> None:
-    """Reduce a picture to a palette of colours, in place.
-
-    Args:
-        path: the PNG.
-        width: largest width [pixels]; None to keep it.
-    """
-    image = Image.open(path).convert("RGB")
-    if width is not None and image.width > width:
-        image = image.resize((width, round(image.height * width / image.width)))
-    image.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
     print(f"{path}  {path.stat().st_size // 1000} kB")
 
 

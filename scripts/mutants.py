@@ -289,7 +289,7 @@ MUTANTS = (
         "        if parent.is_dir():\n            break\n",
         "        break\n",
         ("cli/test_play.py",),
-        "place_that",
+        "place_that or bad_input",
     ),
     Mutant(
         "cli/metrics.py",

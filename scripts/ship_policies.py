@@ -20,8 +20,9 @@ from draft.learn.policy.policy import FAMILY, FOLDER, SKILLS
 from draft.learn.training.ppo.onnx import export
 from draft.learn.training.run import is_run, open_run
 from draft.learn.watching.play import Player
-from draft.study.report.choice import median_seed
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
+from draft.study.report.records import Study
+from draft.study.report.spread import by_seed
 
 
 def main(folder: Path) -> None:
@@ -32,7 +33,7 @@ def main(folder: Path) -> None:
     if is_run(folder):
         _ship(folder, FAMILY)
         return
-    study = gather(folder)
+    study = read(folder)
     for design in study.titles:
         seed = median_seed(study, design)
         name = study.titles[design]
@@ -43,6 +44,20 @@ def main(folder: Path) -> None:
             continue
         for skill, run in runs.items():
             _ship(run, FOLDER / f"{name}-{skill}.onnx")
+
+
+def median_seed(study: Study, design: str) -> int | None:
+    """Return the seed of the median top speed, nominal arm; None if it is unknown for all.
+
+    It is the lower of the two middle seeds of an even number, and the first of seeds with the same
+    speed.
+    """
+    known = by_seed(study, design, "nominal", "top_speed").known
+    ranked = sorted(known, key=lambda seed: (known[seed], seed))
+    if not ranked:
+        return None
+    middle = known[ranked[(len(ranked) - 1) // 2]]
+    return next(seed for seed in ranked if known[seed] == middle)
 
 
 def _ship(run: Path, file: Path) -> None:

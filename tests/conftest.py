@@ -45,6 +45,7 @@ SLOW = (
     "cli/test_references.py",
     "cli/test_study.py",
     "cli/test_train.py",
+    "cli/test_verdict_of_training.py",
     "explore/test_engines.py",
     "imports/test_bad_descriptions.py",
     "model/test_mujoco_log.py",
@@ -93,6 +94,14 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     if config.args_source is not pytest.Config.ArgsSource.TESTPATHS:
         return 0
     return min(os.cpu_count() or 1, MOST_PROCESSES)
+
+
+@pytest.fixture
+def command() -> Any:
+    """Runs commands in this process."""
+    from tests.commands import Command
+
+    return Command()
 
 
 @pytest.fixture(scope="session")

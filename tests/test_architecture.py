@@ -7,8 +7,9 @@ import re
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from graphlib import TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
@@ -25,6 +26,7 @@ GROUND = {
     "geometry",
     "files",
     "extras",
+    "lazy",
     "extensions",
     "offscreen",
     "mujoco_log",
@@ -35,18 +37,7 @@ GROUND = {
 }
 # What each part of the house may import, besides itself and the ground it stands on.
 BELOW: dict[str, set[str]] = {
-    "errors": set(),
-    "values": set(),
-    "geometry": set(),
-    "files": set(),
-    "extras": set(),
-    "extensions": set(),
-    "offscreen": set(),
-    "mujoco_log": set(),
-    "parallel": set(),
-    "plotting": set(),
-    "settings": set(),
-    "webpage": set(),
+    **{name: set() for name in GROUND},
     # core
     "laws": set(),
     "spec": {"laws"},
@@ -61,8 +52,8 @@ BELOW: dict[str, set[str]] = {
     # what designs can do
     "metrics": {"laws", "spec", "design", "model"},
     "variation": {"laws", "spec"},
-    "explore": {"laws", "spec", "design", "model", "metrics", "variation"},
     "learn": {"laws", "spec", "design", "model", "metrics", "variation", "serving"},
+    "explore": {"laws", "spec", "design", "model", "metrics", "variation", "learn"},
     "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"},
     "studio": {
         *("laws", "spec", "design", "model", "metrics", "explore", "learn"),
@@ -81,14 +72,6 @@ BELOW: dict[str, set[str]] = {
     "__init__": set(),
     "__main__": {"cli"},
 }
-# The verbs, and metrics of behaviour: the only calls that go up, each from its own function.
-VERBS = {
-    ("metrics/learned.py", "of_policy", "learn"),
-    ("metrics/learned.py", "digest", "learn"),
-    ("spec/spec.py", "Spec.resolve", "design"),
-    ("design/design.py", "Design.build", "model"),
-    ("design/design.py", "Design.build_batch", "model"),
-}
 HEAVY = (
     *("mujoco", "pydantic", "yaml", "numpy", "torch", "mjlab", "trimesh"),
     *("scipy", "pyarrow", "optuna", "ray"),
@@ -97,11 +80,16 @@ HEAVY = (
 
 @dataclass(frozen=True)
 class Import:
-    """An import of a part of Draft: in which file and function, of which module."""
+    """An import of a part of Draft: in which file and function, of which module.
+
+    Attributes:
+        by_verb: whether the function is marked as a `draft.lazy.verb`.
+    """
 
     file: str
     function: str
     module: str
+    by_verb: bool
 
     @property
     def part(self) -> str:
@@ -112,67 +100,85 @@ class Import:
         return self.file.split("/")[0].removesuffix(".py")
 
 
-def _imports(path: Path) -> Iterator[Import]:
+@cache
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def trees() -> Iterator[None]:
+    """Forget the trees, which are large, when the tests of this file have read them."""
+    yield
+    _tree.cache_clear()
+
+
+@cache
+def _imports(path: Path) -> tuple[Import, ...]:
     """Imports of Draft that run: those for type checkers are left out."""
     file = path.relative_to(SOURCE).as_posix()
 
-    def walk(node: ast.AST, scope: tuple[str, ...]) -> Iterator[Import]:
+    def walk(node: ast.AST, scope: tuple[str, ...], verb: bool) -> Iterator[Import]:
         for child in ast.iter_child_nodes(node):
-            inner = scope
+            inner, marked = scope, verb
             if isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
                 inner = (*scope, child.name)
+                marked = "verb" in map(ast.unparse, child.decorator_list)
             if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
                 for other in child.orelse:
-                    yield from walk(other, scope)
+                    yield from walk(other, scope, verb)
                 continue
-            for module in _modules(child, path):
+            for module in _modules(child):
                 if module.split(".")[0] == "draft":
-                    yield Import(file, ".".join(scope), module)
-            yield from walk(child, inner)
+                    yield Import(file, ".".join(scope), module, verb)
+            yield from walk(child, inner, marked)
 
-    yield from walk(ast.parse(path.read_text(encoding="utf-8")), ())
+    return tuple(walk(_tree(path), (), False))
 
 
-def _modules(node: ast.AST, path: Path) -> list[str]:
+def _modules(node: ast.AST) -> list[str]:
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
     if not isinstance(node, ast.ImportFrom):
         return []
-    assert node.level == 0, f"{path}: imports are written out in full"
+    assert node.level == 0, "imports are written out in full"
     return [f"{node.module}.{alias.name}" for alias in node.names]
 
 
 def _part_of(name: str) -> str:
     """Part of the house that a name of the package itself comes from."""
-    return draft._MODULES.get(name, f"draft.{name}").split(".")[1]
+    return (draft._MODULES.get(name) or f"draft.{name}").split(".")[1]
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(SOURCE).as_posix())
-def test_imports_run_one_way(path: Path) -> None:
-    for item in _imports(path):
-        allowed = BELOW[item.importer] | GROUND | {item.importer}
-        if item.importer in GROUND:
-            allowed = GROUND
-        up = (item.file, item.function, _part_of(item.part)) in VERBS
-        assert up or _part_of(item.part) in allowed, item
+def test_imports_run_one_way() -> None:
+    for item in (item for path in FILES for item in _imports(path)):
+        allowed = GROUND if item.importer in GROUND else BELOW[item.importer] | GROUND
+        assert item.by_verb or _part_of(item.part) in allowed | {item.importer}, item
 
 
-@pytest.mark.slow
-def test_the_two_verbs_go_up_and_nothing_else_does() -> None:
-    up = {
-        (item.file, item.function, item.part)
+def test_a_verb_hands_on_to_one_later_package_and_needs_its_mark() -> None:
+    up: dict[tuple[str, str], set[str]] = {}
+    for item in (item for path in FILES for item in _imports(path) if item.by_verb):
+        later = up.setdefault((item.file, item.function), set())
+        if item.part not in BELOW[item.importer] | GROUND | {item.importer}:
+            assert item.importer in BELOW[item.part]
+            later.add(item.part)
+    assert up
+    assert all(len(later) == 1 for later in up.values()), up
+
+
+def test_only_packages_offer_names_that_are_imported_on_first_use() -> None:
+    offer = {
+        path.relative_to(SOURCE).as_posix()
         for path in FILES
-        for item in _imports(path)
-        if item.importer in BELOW and item.part not in BELOW[item.importer] | GROUND
-        if item.part != item.importer
+        if re.search(r"^__getattr__ = on_first_use", path.read_text(encoding="utf-8"), re.M)
     }
-    assert up == VERBS
+    assert {file for file in offer if not file.endswith("__init__.py")} == {"extend.py"}
 
 
-def _starts_of_the_command_line(text: str) -> list[int]:
+def _starts_of_the_command_line(tree: ast.AST) -> list[int]:
     """Lines that name the command line in a string: imports that the tests above cannot see."""
     found = []
-    for node in ast.walk(ast.parse(text)):
+    for node in ast.walk(tree):
         named = False
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             named = "draft.cli" in node.value or "draft.__main__" in node.value
@@ -191,13 +197,15 @@ def _words(node: ast.AST) -> list[object]:
     return [one.value if isinstance(one, ast.Constant) else None for one in entries]
 
 
-@pytest.mark.parametrize(
-    "path",
-    [path for path in FILES if path.relative_to(SOURCE).parts[0] not in ("cli", "__main__.py")],
-    ids=lambda path: path.relative_to(SOURCE).as_posix(),
-)
-def test_nothing_below_starts_the_command_line_by_its_name(path: Path) -> None:
-    assert _starts_of_the_command_line(path.read_text(encoding="utf-8")) == []
+def _found(lines: Callable[[ast.AST], list[int]], *but: str) -> dict[str, list[int]]:
+    """Lines that are found in files, except those below some names."""
+    names = {path: path.relative_to(SOURCE) for path in FILES}
+    read = [path for path in FILES if names[path].parts[0] not in but]
+    return {names[path].as_posix(): found for path in read if (found := lines(_tree(path)))}
+
+
+def test_nothing_below_starts_the_command_line_by_its_name() -> None:
+    assert _found(_starts_of_the_command_line, "cli", "__main__.py") == {}
 
 
 def test_what_starts_the_command_line_by_its_name_is_found() -> None:
@@ -207,51 +215,44 @@ def test_what_starts_the_command_line_by_its_name_is_found() -> None:
         'run([sys.executable, "-m", "draft", "train"])',
         'run(["draft", "train"])',
     ):
-        assert _starts_of_the_command_line(text) == [1]
-    assert _starts_of_the_command_line('run([sys.executable, "-m", "draft.learn.x"])') == []
+        assert _starts_of_the_command_line(ast.parse(text)) == [1]
+    other = ast.parse('run([sys.executable, "-m", "draft.learn.x"])')
+    assert _starts_of_the_command_line(other) == []
 
 
 OPTION = re.compile(r"(?<![\w-])--[a-z]+(?:-[a-z]+)*(?![\w-])")
 
 
-def _options(text: str) -> list[int]:
+def _options(tree: ast.AST) -> list[int]:
     """Lines that spell an option in a string; a word of a list is an argument of a process."""
-    tree = ast.parse(text)
     words = {id(one) for node in ast.walk(tree) if isinstance(node, ast.List) for one in node.elts}
-    return [
-        node.lineno
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-        if OPTION.search(node.value) and id(node) not in words
-    ]
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):  # an option whose name is filled in
+            parts = [one.value if isinstance(one, ast.Constant) else None for one in node.values]
+            named = any(one is None and str(before)[-2:] == "--" for before, one in pairwise(parts))
+        else:
+            text = node.value if isinstance(node, ast.Constant) else None
+            named = isinstance(text, str) and bool(OPTION.search(text)) and id(node) not in words
+        if named:
+            found.append(getattr(node, "lineno", 0))
+    return found
 
 
-@pytest.mark.parametrize(
-    "path",
-    [path for path in FILES if path.relative_to(SOURCE).parts[0] != "cli"],
-    ids=lambda path: path.relative_to(SOURCE).as_posix(),
-)
-def test_only_the_command_line_spells_options(path: Path) -> None:
-    text = path.read_text(encoding="utf-8")
-    assert _options(text) == []
-    assert "--{" not in text, "an option whose name is filled in"
+def test_only_the_command_line_spells_options() -> None:
+    assert _found(_options, "cli") == {}
 
 
 def test_what_spells_an_option_is_found() -> None:
     for text in (
         'raise DraftError(cause, "omit --out")',
         'f"--knee-drive {place}"',
+        'f"--{name}"',
         '"""As `--json` prints it."""',
     ):
-        assert _options(text) == [1]
+        assert _options(ast.parse(text)) == [1]
     for text in ('run(["uv", "sync", "--no-dev"])', '"--"', '"`Spec --resolve--> Design`"'):
-        assert _options(text) == []
-
-
-def test_the_ground_stands_on_nothing_but_itself() -> None:
-    for name in GROUND:
-        for item in _imports(SOURCE / f"{name}.py"):
-            assert item.part in GROUND
+        assert _options(ast.parse(text)) == []
 
 
 def _loaded_after(code: str, modules: Sequence[str] = HEAVY, cwd: Path | None = None) -> set[str]:
@@ -350,10 +351,9 @@ def _module(path: Path) -> str:
     return ".".join(parts).removesuffix(".__init__")
 
 
-@pytest.mark.parametrize("wing", sorted({path.relative_to(SOURCE).parts[0] for path in FILES}))
-def test_no_two_files_below_a_package_have_one_name(wing: str) -> None:
-    names = Counter(path.name for path in (SOURCE / wing).rglob("*.py"))
-    del names["__init__.py"]
+def test_no_two_files_below_a_package_have_one_name() -> None:
+    places = [path.relative_to(SOURCE) for path in FILES if path.name != "__init__.py"]
+    names = Counter((place.parts[0], place.name) for place in places if len(place.parts) > 1)
     assert [name for name, count in names.items() if count > 1] == []
 
 
@@ -362,14 +362,27 @@ FORBIDDEN_MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "jobl
 FORBIDDEN_METHODS = {"yaml.load", "yaml.unsafe_load", "yaml.full_load", "os.system"}
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(SOURCE).as_posix())
-def test_no_file_can_run_or_unpickle_a_users_text(path: Path) -> None:
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+def _forbidden(tree: ast.AST) -> list[int]:
+    """Lines that can run or unpickle a user's text, or start a shell."""
+    found = []
+    for node in ast.walk(tree):
+        bad = False
         if isinstance(node, ast.Call):
-            called = ast.unparse(node.func)
-            assert called not in FORBIDDEN_CALLS | FORBIDDEN_METHODS, f"line {node.lineno}"
-        if isinstance(node, (ast.Import, ast.ImportFrom)):
-            roots = {module.split(".")[0] for module in _modules(node, path)}
-            assert not roots & FORBIDDEN_MODULES, f"line {node.lineno}"
-        if isinstance(node, ast.keyword) and node.arg == "shell":
-            assert ast.unparse(node.value) == "False", f"line {node.value.lineno}"
+            bad = ast.unparse(node.func) in FORBIDDEN_CALLS | FORBIDDEN_METHODS
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            bad = any(module.split(".")[0] in FORBIDDEN_MODULES for module in _modules(node))
+        elif isinstance(node, ast.keyword) and node.arg == "shell":
+            bad = ast.unparse(node.value) != "False"
+        if bad:
+            found.append(getattr(node, "lineno", 0))
+    return found
+
+
+def test_no_file_can_run_or_unpickle_a_users_text() -> None:
+    assert _found(_forbidden) == {}
+
+
+def test_what_can_run_a_users_text_is_found() -> None:
+    for text in ("eval(text)", "from pickle import loads", "yaml.load(a)", "run(a, shell=True)"):
+        assert _forbidden(ast.parse(text)) == [1]
+    assert _forbidden(ast.parse("run(a, shell=False)\nyaml.safe_load(a)")) == []

@@ -22,6 +22,7 @@ def test_the_tables_of_the_actuator_trends_are_what_the_code_gives():
     assert written.count("<!-- ") == 3 + len(actuator_forms.TRIED)
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_page_on_python_run(tmp_path, monkeypatch):
     for module in ("pyarrow", "scipy"):
         pytest.importorskip(module)

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,16 @@ from draft import doctor, extras
 from draft.cli import main
 from draft.learn.engine import machine
 
-ASK_RENDERERS = doctor.renderers
+ASK_RENDERERS, SIZE_OF_CUDA = doctor.renderers, doctor._cuda_size
+# Not imported: that takes seconds, and the doctor does not either.
+needs_mjlab = pytest.mark.skipif(find_spec("mjlab") is None, reason="needs the extra learn")
 
 
 @pytest.fixture(autouse=True)
-def no_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let renderers answer at once."""
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let renderers and packages answer at once."""
     monkeypatch.setattr(doctor, "renderers", lambda: {"egl": "draws", "osmesa": "fails"})
+    monkeypatch.setattr(doctor, "_cuda_size", lambda: 0)
 
 
 def rows(**options: bool) -> dict[str, str]:
@@ -40,14 +44,16 @@ def without(monkeypatch: pytest.MonkeyPatch, *libraries: str) -> None:
 
 
 def test_the_table_is_markdown_with_a_row_for_every_extra(
-    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr(doctor, "renderers", lambda: {"egl": "fails (a | b)"})
     assert main(["doctor"]) == 0
     lines = capsys.readouterr().out.splitlines()
     cells = [line.removeprefix("| ").removesuffix(" |").split(" | ") for line in lines]
     assert lines[0].startswith("| item")
     assert set(lines[1]) == {"|", "-"}
     assert all(len(row) == 2 for row in cells[2:])
+    assert any("fails (a \\| b)" in text for _, text in cells[2:])
     items = [item.strip() for item, _ in cells[2:]]
     assert set(items) >= {"draft", "python", "libraries", "gpu", "drawing", "browser", "cores"}
     known = {"explore", "figures", "learn", "report", "view"}
@@ -77,10 +83,10 @@ def test_a_library_that_only_some_systems_need_is_not_missing() -> None:
     assert {"mjlab", "scipy"} <= set(extras.required()["learn"])
 
 
+@needs_mjlab
 def test_the_expected_minutes_are_those_of_learn_show(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    pytest.importorskip("mjlab", reason="needs the extra learn")
     monkeypatch.setattr(machine, "gpu_possible", lambda: False)
     minutes = record(capsys)["learning"]["minutes"]
     assert main(["learn", "show", "--json"]) == 0
@@ -88,10 +94,10 @@ def test_the_expected_minutes_are_those_of_learn_show(
     assert min(minutes.values()) > 0
 
 
+@needs_mjlab
 def test_a_gpu_is_assumed_from_its_driver_unless_pytorch_is_asked(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    pytest.importorskip("mjlab", reason="needs the extra learn")
     monkeypatch.setattr(machine, "gpu_possible", lambda: True)
     asked: list[str] = []
     monkeypatch.setattr(machine, "devices", lambda name: asked.append(name) or ["cpu"])
@@ -123,6 +129,7 @@ def test_a_build_of_pytorch_for_cuda_is_named_where_there_is_no_gpu(
     monkeypatch.setattr(extras, "installed", lambda name: "2.9.0")
     monkeypatch.setattr(doctor, "gpu_possible", lambda: driver)
     monkeypatch.setattr(doctor, "_nvidia", list)
+    monkeypatch.setattr(doctor, "_cuda_size", SIZE_OF_CUDA)
     row = doctor._gpu()
     assert ("is a build for CUDA" in row.text) == said
     assert ("docs/reference/installing.md" in row.text) == said
@@ -169,14 +176,6 @@ def test_broken_learning_is_a_row_and_the_rest_is_there(monkeypatch: pytest.Monk
     assert "drawing" in found
 
 
-def test_a_pipe_in_a_message_does_not_break_the_table(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(doctor, "renderers", lambda: {"egl": "fails (a | b)"})
-    assert main(["doctor"]) == 0
-    assert "fails (a \\| b)" in capsys.readouterr().out
-
-
 def fresh(code: str, more: Mapping[str, str], folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", code],
@@ -188,6 +187,7 @@ def fresh(code: str, more: Mapping[str, str], folder: Path) -> subprocess.Comple
     )
 
 
+@pytest.mark.slow
 def test_nothing_large_is_imported(tmp_path: Path) -> None:
     code = (
         "import sys\nfrom draft import doctor\nfrom draft.cli import main\n"
@@ -198,6 +198,7 @@ def test_nothing_large_is_imported(tmp_path: Path) -> None:
     assert done.stdout.splitlines()[-1] == "LOADED", done.stderr
 
 
+@pytest.mark.slow
 def test_an_invalid_renderer_is_bad_input_for_other_commands_and_none_for_the_doctor(
     tmp_path: Path,
 ) -> None:
@@ -212,6 +213,7 @@ def test_an_invalid_renderer_is_bad_input_for_other_commands_and_none_for_the_do
     assert "learning" in told.stdout
 
 
+@pytest.mark.slow
 def test_a_deleted_current_folder_is_bad_input(tmp_path: Path) -> None:
     for words in (["check", "bear"], ["sweep", "bear"], ["new", "mine"]):
         code = (

@@ -60,7 +60,8 @@ def _named() -> Iterator[str]:
     """Extras that the calls of the package name."""
     wanted = {"need": 1, "check": 1, "need_installed": 1, "missing": 1, "remedy": 0}
     for path in (ROOT / "src").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        text = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)) if "draft.extras" in text else ():
             if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
                 continue
             for argument in node.args[wanted.get(node.func.id, len(node.args)) :]:

@@ -101,11 +101,11 @@ def test_a_new_folder_does_not_replace_one_with_content(tmp_path: Path) -> None:
 
 def test_a_locked_folder_is_known_and_locked_once(tmp_path: Path) -> None:
     assert not files.locked(tmp_path)
-    with files.lock(tmp_path, "draft train"):
+    with files.lock(tmp_path, "training"):
         assert files.locked(tmp_path)
-        words = rf"another 'draft study' is running in .*process {os.getpid()}"
+        words = rf"another study is running in .*process {os.getpid()}"
         with pytest.raises(DraftError, match=words):
-            files.lock(tmp_path, "draft study")
+            files.lock(tmp_path, "study")
     assert not files.locked(tmp_path)
 
 
@@ -122,12 +122,12 @@ def test_windows_locks_a_byte_behind_the_number_of_the_process(
     windows = SimpleNamespace(locking=locking, LK_NBLCK=2)
     monkeypatch.setitem(sys.modules, "msvcrt", windows)
     monkeypatch.setattr(sys, "platform", "win32")
-    with files.lock(tmp_path, "draft train"):
+    with files.lock(tmp_path, "training"):
         assert held[0] > 1000
         assert (tmp_path / files.LOCK).read_text() == str(os.getpid())
         assert files.locked(tmp_path)
-        with pytest.raises(DraftError, match=f"another 'draft study' .*process {os.getpid()}"):
-            files.lock(tmp_path, "draft study")
+        with pytest.raises(DraftError, match=f"another study .*process {os.getpid()}"):
+            files.lock(tmp_path, "study")
     held.clear()
     assert not files.locked(tmp_path)
 

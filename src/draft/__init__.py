@@ -23,6 +23,7 @@ from draft.errors import (
     ResolveError,
     SpecError,
 )
+from draft.lazy import on_first_use
 
 if TYPE_CHECKING:
     from draft import extend, metrics, study
@@ -81,30 +82,25 @@ _MODULES = {
     "compare_twin": "draft.twins.compare",
     "evaluate": "draft.learn.measuring.evaluation",
     "export": "draft.model.export",
+    "extend": "",
     "import_robot": "draft.imports.importer",
     "load": "draft.spec",
+    "metrics": "",
     "optimise": "draft.explore.optimise",
     "play": "draft.learn.policy.playback",
     "policy": "draft.learn.policy.policy",
     "report": "draft.reporting.report",
     "screen": "draft.explore.screen",
     "shipped": "draft.spec",
+    "study": "",
     "surface": "draft.learn.measuring.surface",
     "sweep": "draft.explore.sweep",
     "train": "draft.learn.training.train",
 }
 
 
+__getattr__ = on_first_use(__name__, _MODULES)
+
+
 def __dir__() -> list[str]:
     return sorted(__all__)
-
-
-def __getattr__(name: str) -> object:
-    """Import a public name on first use, so that `import draft` is fast."""
-    import importlib
-
-    if name in ("extend", "metrics", "study"):  # modules: importing one sets the attribute
-        return importlib.import_module(f"draft.{name}")
-    if name not in _MODULES:
-        raise AttributeError(f"module 'draft' has no attribute '{name}'")
-    return getattr(importlib.import_module(_MODULES[name]), name)

@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from draft.lazy import on_first_use
+
 if TYPE_CHECKING:
     from draft.design import Design, Finding
     from draft.design.checks import check
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
     from draft.spec.primitives.basic import LinkBase
     from draft.values import Mask, Value
 
-# Module of each name, and its name there if that is another one.
 _MODULES = {
     # Decorators, and the function that adds robots.
     "actuator_laws": "draft.laws.actuators",
@@ -124,16 +125,9 @@ __all__ = [
     "termination",
 ]
 
+# An extension loads only what it needs.
+__getattr__ = on_first_use(__name__, _MODULES)
+
 
 def __dir__() -> list[str]:
     return sorted(__all__)
-
-
-def __getattr__(name: str) -> object:
-    """Import a name on first use: an extension loads only what it needs."""
-    import importlib
-
-    if name not in _MODULES:
-        raise AttributeError(f"module 'draft.extend' has no attribute '{name}'")
-    module, _, there = _MODULES[name].partition(":")
-    return getattr(importlib.import_module(module), there or name)

@@ -220,14 +220,14 @@ def _exchange(a: Path, b: Path) -> bool:
 
 
 @contextmanager
-def held(folder: Path, command: str) -> Iterator[None]:
+def held(folder: Path, what: str) -> Iterator[None]:
     """Hold the lock of a folder, which is made if it is missing.
 
     A block that fails leaves none of the folders that were made for it, unless it wrote something.
 
     Args:
         folder: the folder.
-        command: name of the command that locks it, for the message.
+        what: what locks it, for the message, such as "search".
 
     Raises:
         DraftError: another process holds the lock, or the folder cannot be written.
@@ -236,7 +236,7 @@ def held(folder: Path, command: str) -> Iterator[None]:
     try:
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            file = lock(folder, command)
+            file = lock(folder, what)
         except OSError as error:
             raise cannot_write(folder, error, "choose another `out`") from None
         with file:
@@ -250,12 +250,12 @@ def held(folder: Path, command: str) -> Iterator[None]:
         raise
 
 
-def lock(folder: Path, command: str) -> IO[str]:
+def lock(folder: Path, what: str) -> IO[str]:
     """Lock a folder for this process; the system releases the lock however the process ends.
 
     Args:
         folder: it must exist.
-        command: name of the command that locks it, for the message.
+        what: what locks it, for the message, such as "search".
 
     Returns:
         The open lock file; close it to release the lock.
@@ -267,7 +267,7 @@ def lock(folder: Path, command: str) -> IO[str]:
     file = (folder / LOCK).open("a+", encoding="utf-8")
     if not _hold(file):
         file.seek(0)
-        cause = f"another '{command}' is running in '{folder}' (process {file.read() or '?'})"
+        cause = f"another {what} is running in '{folder}' (process {file.read() or '?'})"
         file.close()
         raise DraftError(cause, "wait for it, or choose another `out`") from None
     file.truncate(0)

@@ -16,10 +16,12 @@ from draft.values import Value, cos, is_array, sin, sqrt
 Vector = tuple[Value, Value, Value]
 Matrix = tuple[Vector, Vector, Vector]
 Rotation = Matrix | None
+Frame = tuple[Vector, Rotation]  # origin [m] and rotation, in another frame
 
 _ARRAY = np.ndarray
 
 ZERO: Vector = (0.0, 0.0, 0.0)
+ORIGIN: Frame = (ZERO, None)
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 

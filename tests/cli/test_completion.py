@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from draft.cli import COMMANDS, functions, main
-from draft.cli.completion import entries, script
+from draft.cli.completion import script
+from tests.commands import Command
 
 bash = shutil.which("bash")
 needs_bash = pytest.mark.skipif(bash is None, reason="bash is not installed")
@@ -41,31 +40,12 @@ def offered(completion: Path, *words: str) -> list[str]:
     return done.stdout.split("\n")[:-1] if done.stdout.strip() else []
 
 
-def test_every_option_of_every_command_is_known(capsys: pytest.CaptureFixture[str]) -> None:
-    known = {entry.command: {*entry.options, "--help"} for entry in entries()}
-    paths = [[name] for name in COMMANDS]
-    paths += [[name, verb] for name in COMMANDS for verb in functions(name)[1]]
-    assert {" ".join(path) for path in paths} == set(known)
-    for path in paths:
-        if functions(path[0])[0] is None and len(path) == 1:
-            assert main([*path, "--help"]) == 0
-        else:
-            with pytest.raises(SystemExit):
-                main([*path, "--help"])
-        told = capsys.readouterr().out
-        listed = set(re.findall(r"^ +(?:-h, )?(--[a-z][a-z-]*)", told, re.MULTILINE)) or {"--help"}
-        assert known[" ".join(path)] == listed, path
-
-
 @needs_bash
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
         (("bu",), ["build"]),
-        (
-            ("s",),
-            ["show", "studio", "screen", "sweep", "study", "surface", "survey", "schema"],
-        ),
+        (("s",), ["show", "studio", "screen", "sweep", "study", "surface", "survey", "schema"]),
         (("--v",), ["--version"]),
         (("--install-completion", ""), ["bash", "zsh"]),
         (("show", "b"), ["bear"]),
@@ -100,25 +80,15 @@ def test_bash_offers_what_continues_the_line(
 
 
 def test_the_script_is_installed_for_the_login_shell(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     monkeypatch.setenv("SHELL", "/usr/bin/bash")
     path = tmp_path / "data/bash-completion/completions/draft"
-    assert main(["--install-completion"]) == 0
-    assert f"source {path}" in capsys.readouterr().out
+    assert f"source {path}" in command("--install-completion").out
     assert path.read_text() == script()
-    assert main(["--install-completion", "zsh"]) == 0
-    assert f"bashcompinit && source {path}" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(("shell", "arguments"), [("/bin/fish", []), ("", []), ("bash", ["tcsh"])])
-def test_a_shell_without_completion_is_reported(
-    shell: str,
-    arguments: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setenv("SHELL", shell)
-    assert main(["--install-completion", *arguments]) == 2
-    assert "run draft --install-completion bash or zsh" in capsys.readouterr().err
+    assert f"bashcompinit && source {path}" in command("--install-completion zsh").out
+    for shell, words in (("/bin/fish", ""), ("", ""), ("bash", " tcsh")):
+        monkeypatch.setenv("SHELL", shell)
+        err = command.refuses(f"--install-completion{words}")
+        assert "run draft --install-completion bash or zsh" in err

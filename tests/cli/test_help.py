@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 import draft.cli
-from draft.cli import COMMANDS, functions, main
+from draft.cli import COMMANDS, functions
 from draft.cli.completion import entries
 from draft.errors import counted
+from tests.commands import Command
 
 PATHS = [
     (command, *more)
@@ -20,22 +22,17 @@ PATHS = [
 OPTIONS = {entry.command: entry.options for entry in entries()}
 
 
-def help_of(*path: str, capsys: pytest.CaptureFixture[str]) -> str:
-    """Help of a command or subcommand, on one line."""
-    if len(path) == 1 and functions(path[0])[0] is None:
-        assert main([*path, "--help"]) == 0
-    else:
-        with pytest.raises(SystemExit) as ended:
-            main([*path, "--help"])
-        assert ended.value.code == 0
-    return " ".join(capsys.readouterr().out.split())
+def help_of(path: Sequence[str], command: Command) -> str:
+    """Help of a command or subcommand."""
+    return command(" ".join(path), "--help").out
 
 
 @pytest.mark.parametrize("path", PATHS, ids=" ".join)
-def test_help_shows_real_defaults(
-    path: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+def test_help_shows_real_defaults_and_completion_knows_the_options(
+    path: tuple[str, ...], command: Command
 ) -> None:
-    told = help_of(*path, capsys=capsys)
+    said = help_of(path, command)
+    told = " ".join(said.split())
     assert told.startswith(f"usage: draft {' '.join(path)} ")
     assert "None" not in told
     assert not re.search(r"\(default: *\)|\{\}|=>|STR\b|INT\b|FLOAT\b|PATH\b", told)
@@ -43,60 +40,48 @@ def test_help_shows_real_defaults(
     options = OPTIONS[" ".join(path)]
     stated = re.findall(r"\((?:default: [^)]+|required[^)]*)\)", told)
     assert len(stated) >= len(options)
+    listed = set(re.findall(r"^ +(?:-h, )?(--[a-z][a-z-]*)", said, re.MULTILINE))
+    assert {*options, "--help"} == (listed or {"--help"})
 
 
-def test_a_command_without_its_subcommand_names_them(capsys: pytest.CaptureFixture[str]) -> None:
-    for command in ("learn", "trends", "survey"):
-        names = ", ".join(sorted(functions(command)[1]))
-        assert main([command]) == 2
-        err = capsys.readouterr().err
-        assert err == (f"error: 'draft {command}' needs a subcommand\n  subcommands: {names}\n")
-    assert main(["survey", "tabel"]) == 2
-    err = capsys.readouterr().err
+def test_completion_knows_every_command() -> None:
+    assert {" ".join(path) for path in PATHS} == set(OPTIONS)
+
+
+def test_a_command_without_its_subcommand_names_them(command: Command) -> None:
+    for word in ("learn", "trends", "survey"):
+        names = ", ".join(sorted(functions(word)[1]))
+        err = f"error: 'draft {word}' needs a subcommand\n  subcommands: {names}\n"
+        assert command.refuses(word) == err
+    err = command.refuses("survey tabel")
     assert "'draft survey' has no subcommand 'tabel'\n  did you mean 'table'?" in err
 
 
 @pytest.mark.parametrize(
-    ("words", "near"),
+    ("words", "option", "near"),
     [
-        (("build", "bear", "--output", "x"), "--out"),
-        (("screen", "bear", "--output=x.parquet"), "--out"),
-        (("import", "a.urdf", "--out_folder", "x"), "--out"),
-        (("train", "bear", "--minuts", "8"), "--minutes"),
-        (("trends", "fit", "--outfile", "x"), "--out"),
-        (("surface", "bear", "--replica", "3"), "--replicas"),
+        ("build bear --output x", "--output", "--out"),
+        ("screen bear --output=x.parquet", "--output", "--out"),
+        ("import a.urdf --out_folder x", "--out-folder", "--out"),
+        ("train bear --minuts 8", "--minuts", "--minutes"),
+        ("trends fit --outfile x", "--outfile", "--out"),
+        ("surface bear --replica 3", "--replica", "--replicas"),
     ],
 )
 def test_an_unknown_option_is_refused_with_the_nearest_one(
-    words: tuple[str, ...], near: str, capsys: pytest.CaptureFixture[str]
+    words: str, option: str, near: str, command: Command
 ) -> None:
-    assert main(words) == 2
-    err = capsys.readouterr().err
-    assert (
-        f"has no option '{words[-2 if '=' not in words[-1] else -1].split('=')[0]}'".replace(
-            "_", "-"
-        )
-        in err
-    )
+    err = command.refuses(words)
+    assert f"has no option '{option}'" in err
     assert f"\n  did you mean '{near}'? " in err
-
-
-@pytest.mark.parametrize("path", PATHS, ids=" ".join)
-def test_every_option_is_known(path: tuple[str, ...]) -> None:
-    main_, subcommands = functions(path[0])
-    function = subcommands[path[1]] if len(path) > 1 else main_
-    if function is not None:
-        draft.cli._check_options(function, " ".join(path), OPTIONS[" ".join(path)])
 
 
 def test_counts_have_nouns_in_the_singular_and_in_the_plural() -> None:
     said = [counted(n, "design") for n in (0, 1, 2, 1000)]
     assert said == ["0 designs", "1 design", "2 designs", "1000 designs"]
     assert counted(1000, "design", ",") == "1,000 designs"
-    assert [counted(2, noun) for noun in ("actuator class", "body")] == [
-        "2 actuator classes",
-        "2 bodies",
-    ]
+    plurals = [counted(2, noun) for noun in ("actuator class", "body")]
+    assert plurals == ["2 actuator classes", "2 bodies"]
 
 
 COMMAND = '''
@@ -124,65 +109,50 @@ def main(
 
 
 def test_a_command_is_added_by_one_file_and_its_line_in_the_table(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     (tmp_path / "weigh.py").write_text(COMMAND)
     monkeypatch.setattr(draft.cli, "__path__", [*draft.cli.__path__, str(tmp_path)])
     monkeypatch.setitem(COMMANDS, "weigh", "Print the mass of a robot.")
     mass = float(draft.load("quadruped").resolve("bear").mass)
-    assert main(["weigh", "bear"]) == 0
-    assert capsys.readouterr().out == f"{mass:.1f}\n"
-    assert main(["weigh", "quadruped", "--design", "bear", "--grams"]) == 0
-    assert capsys.readouterr().out == f"{mass * 1e3:.1f}\n"
-    assert main(["weigh", "baer"]) == 2
-    assert "did you mean 'bear'?" in capsys.readouterr().err
-    assert main(["--help"]) == 0
-    assert re.search(r"weigh +Print the mass of a robot\.", capsys.readouterr().out)
-    assert "--grams Print grams. (default: False)" in help_of("weigh", capsys=capsys)
+    assert command("weigh bear").out == f"{mass:.1f}\n"
+    assert command("weigh quadruped --design bear --grams").out == f"{mass * 1e3:.1f}\n"
+    assert "did you mean 'bear'?" in command.refuses("weigh baer")
+    assert re.search(r"weigh +Print the mass of a robot\.", command("--help").out)
+    assert "--grams Print grams. (default: False)" in " ".join(help_of(["weigh"], command).split())
     completion = {entry.command: entry for entry in entries()}["weigh"]
     assert completion.options == ("--design", "--set", "--grams")
     assert "bear" in completion.values[""].words
 
 
+RANGE = "bear --vary thigh_length=0.2:0.3"
+RESUMES = r"interrupted: .*{}.*; the same command resumes\n"
+
+
 @pytest.mark.parametrize(
-    ("words", "called", "kept"),
+    ("words", "called", "said"),
     [
-        ("optimise bear --vary thigh_length=0.2:0.3 --minimise mass --out s", "optimise", "trials"),
-        ("screen bear --vary thigh_length=0.2:0.3 --out s.parquet", "screen", "the parts done"),
-        ("sweep bear --vary thigh_length=0.2:0.3 --out s", "sweep", "the parts done"),
+        (
+            f"optimise {RANGE} --minimise mass --out s",
+            "explore.optimise.optimise",
+            RESUMES.format("trials"),
+        ),
+        (f"screen {RANGE} --out s", "explore.screen.screen", RESUMES.format("the parts done")),
+        (f"sweep {RANGE} --out s", "explore.sweep.sweep", RESUMES.format("the parts done")),
+        (
+            "report bear",
+            "reporting.report.write_report",
+            "interrupted: nothing is written, and what was there is kept; "
+            "the same command starts again\n",
+        ),
     ],
 )
 def test_ctrl_c_says_what_is_kept_and_how_to_go_on(
-    words: str,
-    called: str,
-    kept: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    words: str, called: str, said: str, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(f"draft.explore.{called}.{called}", interrupt)
-    assert main(words.split()) == 130
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("interrupted: ")
-    assert kept in line
-    assert line.endswith("; the same command resumes")
-
-
-def test_ctrl_c_in_a_report_says_that_nothing_is_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("draft.reporting.report.write_report", interrupt)
-    assert main(["report", "bear"]) == 130
-    assert capsys.readouterr().err == (
-        "interrupted: nothing is written, and what was there is kept; "
-        "the same command starts again\n"
-    )
-    assert not Path("report.html").exists()
+    monkeypatch.setattr(f"draft.{called}", interrupt)
+    assert re.fullmatch(said, command(words, code=130).err)
+    assert [path.name for path in Path().iterdir()] == ["robot"]

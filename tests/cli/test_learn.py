@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import pytest
 from pytest_regressions.file_regression import FileRegressionFixture
 
-from draft.cli import learn, main
+from draft.cli import learn
 from draft.extras import remedy
 from draft.learn.engine import machine
 from draft.learn.engine.machine import Engine, Machine
 from draft.learn.task.config import STAGES, Config
 from draft.learn.task.recipes import RECIPES, Change, Recipe
+from tests.commands import Command
 
 # As the shipped recipe is made; its numbers are tuned again and again.
 LAPTOP = Recipe(
@@ -53,77 +54,83 @@ def a_laptop(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "_RATES", {"native": {"flat": 4700.0, "uneven": 2500.0}})
 
 
-def shown(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+@pytest.fixture
+def shown(command: Command) -> Callable[..., str]:
     """What `draft learn show` prints."""
-    assert main(["learn", "show", *words]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
-    return "\n".join(line.rstrip() for line in out.splitlines()) + "\n"
+
+    def ask(*words: str) -> str:
+        out, err = command("learn show", *words)
+        assert err == ""
+        return "\n".join(line.rstrip() for line in out.splitlines()) + "\n"
+
+    return ask
+
+
+def line_of(shown: str, name: str) -> str:
+    return next(line for line in shown.splitlines() if line.startswith(name))
 
 
 def test_every_number_is_shown_with_its_source(
-    capsys: pytest.CaptureFixture[str], file_regression: FileRegressionFixture
+    shown: Callable[..., str], file_regression: FileRegressionFixture
 ) -> None:
-    out = shown(capsys, "giraffe", "--recipe", "paper")
+    out = shown("giraffe", "--recipe", "paper")
     file_regression.check(out.partition("\n\n")[2])
 
 
-def test_the_first_lines_tell_what_would_train_here(capsys: pytest.CaptureFixture[str]) -> None:
-    assert shown(capsys).startswith(LAPTOP_LINES)
-    first = shown(capsys, "--stage", "terrain", "--recipe", "paper").splitlines()
+def test_the_first_lines_tell_what_would_train_here(shown: Callable[..., str]) -> None:
+    assert shown().startswith(LAPTOP_LINES)
+    first = shown("--stage", "terrain", "--recipe", "paper").splitlines()
     words = "recipe paper: terrain 2000 iterations of 4096 worlds on uneven ground, about 655 min"
     assert first[1:3] == [words, ""]
     few = ("learning.iterations_base=3", "learning.environments=1")
-    out = shown(capsys, "--stage", "base", "--set", *few).splitlines()
+    out = shown("--stage", "base", "--set", *few).splitlines()
     assert out[0].endswith("2 cores, 1 process")
     assert out[1].endswith("base 3 iterations of 1 world on flat ground, less than 1 min")
 
 
-def test_numbers_of_a_recipe_tell_its_reasons(capsys: pytest.CaptureFixture[str]) -> None:
-    out = shown(capsys)
+def test_numbers_of_a_recipe_tell_its_reasons(shown: Callable[..., str]) -> None:
+    out = shown()
+    assert out.count("\n") > len(Config().rows())
+    assert "s = " not in out.replace("s = L", "")  # Without a design there is one value.
     assert out.count("choice: laptop") == len(LAPTOP.changes)
     why = LAPTOP.changes["learning.environments"].why
     words = f"learning.environments 512 1 choice: laptop number of worlds; {why}"
     assert words in " ".join(out.split())
-    assert "choice: laptop" not in shown(capsys, "--recipe", "paper")
+    assert "choice: laptop" not in shown("--recipe", "paper")
     # What is given otherwise has nothing to do with the recipe.
-    line = next(
-        one
-        for one in shown(capsys, "--set", "learning.environments=64").splitlines()
-        if one.startswith("learning.environments")
-    )
+    line = line_of(shown("--set", "learning.environments=64"), "learning.environments")
     assert "choice: released code" in line
     assert line.endswith("number of worlds")
 
 
 def test_on_a_gpu_the_published_numbers_are_the_default(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    shown: Callable[..., str], command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     here(monkeypatch, devices=["cuda:0"], engine=Engine("warp", "it runs on the GPU"))
-    out = shown(capsys, "--stage", "base").splitlines()
+    out = shown("--stage", "base").splitlines()
     assert out[0] == "engine: MuJoCo Warp (it runs on the GPU), cuda:0"
     assert out[1] == "recipe paper: base 1200 iterations of 4096 worlds on uneven ground"
-    told = json.loads(shown(capsys, "--json"))
+    told = command.json("learn show")
     assert (told["recipe"], told["engine"], told["processes"]) == ("paper", "warp", 1)
     assert set(told["minutes"].values()) == {None}
 
 
 def test_what_is_missing_to_train_is_reported_and_the_numbers_are_shown(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    shown: Callable[..., str], command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     here(monkeypatch, engine=None, missing="torch")
-    out = shown(capsys, "--stage", "base").splitlines()
+    out = shown("--stage", "base").splitlines()
     words = f"engine: none yet, torch is not installed ({remedy('learn')}); 2 cores"
     assert out[0] == words
     assert out[1] == "recipe laptop: base 200 iterations of 512 worlds on flat ground"
-    told = json.loads(shown(capsys, "--json"))
+    told = command.json("learn show")
     assert (told["engine"], told["missing"], told["processes"]) == (None, "torch", None)
     assert set(told["minutes"].values()) == {None}
     assert told["numbers"]["learning.environments"]["value"] == 512
 
 
-def test_as_json_there_is_what_would_train_here(capsys: pytest.CaptureFixture[str]) -> None:
-    told = json.loads(shown(capsys, "--json"))
+def test_as_json_there_is_what_would_train_here(command: Command) -> None:
+    told = command.json("learn show")
     expected = {"devices": ["cpu"], "engine": "native", "why": "the fastest without a GPU"}
     expected |= {"missing": None, "cores": 2, "processes": 2, "recipe": "laptop"}
     assert {name: told[name] for name in expected} == expected
@@ -132,31 +139,11 @@ def test_as_json_there_is_what_would_train_here(capsys: pytest.CaptureFixture[st
     worlds = told["numbers"]["learning.environments"]
     assert (worlds["source"], worlds["doc"]) == ("choice: laptop", "number of worlds")
     assert worlds["why"] == LAPTOP.changes["learning.environments"].why
-    assert json.loads(shown(capsys, "--stage", "push", "--json"))["minutes"].keys() == {"push"}
+    assert command.json("learn show --stage push")["minutes"].keys() == {"push"}
 
 
-def test_an_unknown_recipe_is_reported_with_those_there_are(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["learn", "show", "--recipe", "lapto"])
-    assert ended.value.code == 2
-    said = capsys.readouterr()
-    assert "'paper'" in said.out + said.err
-    assert "'laptop'" in said.out + said.err
-
-
-def test_without_a_design_there_is_one_value(capsys: pytest.CaptureFixture[str]) -> None:
-    out = shown(capsys)
-    assert out.count("\n") > len(Config().rows())
-    assert "s = " not in out.replace("s = L", "")
-    assert "rewards.height " in out
-
-
-def test_as_json_every_number_has_its_value_at_the_designs_scale(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    found = json.loads(shown(capsys, "giraffe", "--recipe", "paper", "--json"))
+def test_as_json_every_number_has_its_value_at_the_designs_scale(command: Command) -> None:
+    found = command.json("learn show giraffe --recipe paper")
     assert (found["design"], found["stage"]) == ("quadruped:giraffe", None)
     assert found["scale"] == pytest.approx(1.3 / 0.48)
     names = {f"{g}.{n}" for g, numbers in Config().as_dict().items() for n in numbers}
@@ -176,29 +163,18 @@ def test_as_json_every_number_has_its_value_at_the_designs_scale(
 
 
 @pytest.mark.parametrize("stage", ["base", "velocity", "terrain", "push"])
-def test_a_stage_leaves_out_what_is_of_others_only(
-    capsys: pytest.CaptureFixture[str], stage: str
-) -> None:
-    found = json.loads(shown(capsys, "--stage", stage, "--json"))["numbers"]
+def test_a_stage_leaves_out_what_is_of_others_only(command: Command, stage: str) -> None:
+    found = command.json(f"learn show --stage {stage}")["numbers"]
     groups = {name.split(".")[0] for name in found}
     assert groups & {"velocity", "terrain", "push"} == {stage} - {"base"}
     assert {"rewards", "commands", "episodes", "learning"} < groups
     assert [n for n in found if "iterations_" in n] == [f"learning.iterations_{stage}"]
 
 
-def test_changed_numbers_are_shown_changed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_changed_numbers_are_shown_changed(shown: Callable[..., str], command: Command) -> None:
     words = ("--set", "rewards.height=0.5", "push.ramp=[[0, 1], [10, 3.5]]", "learning.mirror=true")
-    found = json.loads(shown(capsys, *words, "--json"))["numbers"]
+    found = command.json("learn show", *words)["numbers"]
     assert found["rewards.height"]["value"] == 0.5
     assert found["push.ramp"]["value"] == [[0, 1.0], [10, 3.5]]
     assert found["learning.mirror"]["value"] is True
-    line = next(one for one in shown(capsys, *words).splitlines() if "push.ramp" in one)
-    assert "[[0, 1], [10, 3.5]]" in line
-
-
-def test_hoppers_have_no_numbers(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["learn", "show", "hopper"]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith(
-        "error: hopper cannot be trained: it has one leg with a knee and a foot\n"
-    )
+    assert "[[0, 1], [10, 3.5]]" in line_of(shown(*words), "push.ramp")

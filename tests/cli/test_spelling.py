@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from draft.cli import import_, main, study, train
+from draft.cli import import_, study, train
 from draft.cli.spelling import RUNNING, spelt, spelt_error
 from draft.errors import Location, Problem, ResolveError
 
@@ -29,14 +29,12 @@ def training() -> Iterator[None]:
         ("omit `checkpoint`, or `designs`", "omit `checkpoint`, or `designs`"),
         ("`draft.train` made it", "'draft train' made it"),
         ("`draft.evaluate(RUN)`", "'draft evaluate RUN'"),
+        ('`draft.study.collect("a", out="DIR")`', "'draft study collect a --out DIR'"),
         (
             '`draft.train("my runs/a", iterations=300)` continues',
             "'draft train 'my runs/a' --iterations 300' continues",
         ),
-        (
-            "`draft.compare_twin(FILE)`, `draft.train((`",
-            "`draft.compare_twin(FILE)`, `draft.train((`",
-        ),
+        *((words, words) for words in ("`draft.compare_twin(FILE)`", "`draft.train((`")),
     ],
 )
 @pytest.mark.usefixtures("training")
@@ -61,8 +59,3 @@ def test_an_error_keeps_its_kind_and_its_places() -> None:
     error = spelt_error(ResolveError(problems))
     assert type(error) is ResolveError
     assert str(error) == "--vary:1:5: --seed is odd\n  omit --seed\nno"
-
-
-def test_a_command_says_what_its_user_can_type(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["screen", "quadruped", "--vary", "crouch=0:1", "--out", "a", "--where", "("]) == 2
-    assert "error: --where:1:" in capsys.readouterr().err

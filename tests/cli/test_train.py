@@ -5,14 +5,14 @@ from __future__ import annotations
 import csv
 import importlib.util
 import signal
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from draft.cli import BAD_INPUT, INTERRUPTED, REFUSED, main
-from draft.extras import remedy
+from draft.cli import BAD_INPUT, INTERRUPTED, REFUSED
 from draft.files import lock
-from tests.written import edit, write_robot
+from tests.commands import Command
 
 SMALL = (
     # Several processes are tests/learn/engine/test_ranks.py's.
@@ -24,42 +24,37 @@ needs_mjlab = pytest.mark.skipif(
 )
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
 @pytest.fixture
-def brief_review(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The review after a training lasts one second instead of eight."""
+def small_review(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The review after a training has four robots at each level instead of 64."""
     pytest.importorskip("mjlab")
     from draft.learn.measuring.rollout import review
 
-    monkeypatch.setattr(review, "SECONDS", 1.0)
+    for name in ("review", "before"):
+        monkeypatch.setattr(review, name, partial(getattr(review, name), replicas=4))
 
 
 @needs_mjlab
-@pytest.mark.usefixtures("brief_review")
-def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixture[str]) -> None:
-    command = ["train", "cheetah", "--iterations", "2", *SMALL]
-    assert main([*command, "--minutes", "1e-9"]) == 0
-    said = capsys.readouterr().out
+@pytest.mark.usefixtures("small_review")
+def test_a_run_is_trained_gone_on_with_and_then_done(command: Command) -> None:
+    asked = ("train cheetah --iterations 2", *SMALL)
+    said = command(*asked, "--minutes", "1e-9").out
     assert "quadruped:cheetah: stage base, seed 0, to runs/cheetah-base-0" in said
     assert "on the CPU (" in said
     assert ", 4 worlds\n" in said
     assert "stopped: 0 of 2 iterations are kept, no policy; the same command resumes\n" in said
-    assert main(command) == 0
-    said = capsys.readouterr().out
+    with lock(Path("runs/cheetah-base-0"), "draft train"):
+        assert "another training is running" in command(*asked, code=BAD_INPUT).err
+    said = command(*asked).out
     assert "iteration 2/2" in said
     assert "linear_velocity" in said
     assert "after 0.0 min of training, 0.0 million steps:\n  asked for 0.25 m/s: walks at" in said
     assert "it does not walk as asked at 0.25, 0.5, 0.75, 1 m/s yet" in said
     assert "repeat the command with --iterations 4\n" in said
     assert "see it with: draft play runs/cheetah-base-0\n" in said
-    assert main(command) == 0
-    assert capsys.readouterr().out == "runs/cheetah-base-0: 2 of 2 iterations are done\n"
-    assert main(["train", "runs/cheetah-base-0", "--iterations", "3", "--device", "cpu"]) == 0
-    assert "iteration 3/3" in capsys.readouterr().out
+    assert command(*asked).out == "runs/cheetah-base-0: 2 of 2 iterations are done\n"
+    out = command("train runs/cheetah-base-0 --iterations 3 --device cpu").out
+    assert "iteration 3/3" in out
     with Path("runs/cheetah-base-0/progress.csv").open() as file:
         assert [row["iteration"] for row in csv.DictReader(file)] == ["1", "2", "3"]
     assert list(Path("runs/cheetah-base-0/tensorboard").glob("events*"))
@@ -67,136 +62,87 @@ def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixtu
 
 
 @needs_mjlab
-def test_ctrl_c_keeps_the_policy_and_says_so_and_who_uses_it_says_it_is_unfinished(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+def test_ctrl_c_keeps_the_policy_and_later_stages_and_others_say_that_it_is_unfinished(
+    command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from draft.learn.training.progress import LinePrinter
 
     def interrupt(self: LinePrinter, progress: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    command = ["train", "cheetah", "--iterations", "3", *SMALL]
     with monkeypatch.context() as patch:
         patch.setattr(LinePrinter, "report", interrupt)
-        assert main(command) == INTERRUPTED
-    assert capsys.readouterr().err == (
+        said = command("train cheetah --iterations 3", *SMALL, code=INTERRUPTED)
+    assert said.err == (
         "interrupted: 1 of 3 iterations are kept, with a policy of iteration 1; "
         "the same command resumes\n"
     )
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    run = "runs/cheetah-base-0"
     unfinished = (
-        "policy: iteration 1 of 3, unfinished: 'draft train runs/cheetah-base-0 --iterations 3' "
+        f"policy: iteration 1 of 3, unfinished: 'draft train {run} --iterations 3' "
         "continues the training\n"
     )
-    assert main(["play", "runs/cheetah-base-0", "--onnx"]) == 0
-    assert capsys.readouterr().out.startswith(unfinished)
-    few = ["--replicas", "2", "--levels", "1", "--seconds", "1"]
-    assert main(["evaluate", "runs/cheetah-base-0", *few]) == 0
-    assert capsys.readouterr().out.startswith(f"runs/cheetah-base-0: {unfinished}")
-    push = ["train", "cheetah", "--stage", "push", "--iterations", "1", "--no-review", *SMALL]
-    assert main(push) == 0
-    assert f"starts from runs/cheetah-base-0, {unfinished}" in capsys.readouterr().out
-
-
-@needs_mjlab
-@pytest.mark.usefixtures("brief_review")
-def test_a_later_stage_finds_the_base_run_beside_it(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["train", "cheetah", "--iterations", "1", *SMALL]) == 0
-    assert main(["train", "cheetah", "--stage", "push", "--iterations", "1", *SMALL]) == 0
-    capsys.readouterr()
-    assert main(["train", "bear", "--stage", "push", *SMALL]) == BAD_INPUT
-    assert "there is no run runs/bear-base-0" in capsys.readouterr().err
-    from_cheetah = ["train", "bear", "--stage", "push", "--from", "runs/cheetah-base-0", *SMALL]
-    assert main(from_cheetah) == BAD_INPUT
-    assert "is a run of quadruped:cheetah, which differs from the design" in capsys.readouterr().err
+    assert command(f"play {run} --onnx").out.startswith(unfinished)
+    said = command(f"evaluate {run} --replicas 2 --levels 1 --seconds 1").out
+    assert said.startswith(f"{run}: {unfinished}")
+    # A later stage finds the base run beside it.
+    push = "train cheetah --stage push --iterations 1 --no-review"
+    assert f"starts from {run}, {unfinished}" in command(push, *SMALL).out
+    err = command("train bear --stage push", *SMALL, code=BAD_INPUT).err
+    assert "there is no run runs/bear-base-0" in err
+    err = command(f"train bear --stage push --from {run}", *SMALL, code=BAD_INPUT).err
+    assert "is a run of quadruped:cheetah, which differs from the design" in err
     assert not Path("runs/bear-push-0").exists()
 
 
 @needs_mjlab
-@pytest.mark.usefixtures("brief_review")
-def test_a_run_is_one_processs_at_a_time(capsys: pytest.CaptureFixture[str]) -> None:
-    command = ["train", "cheetah", "--iterations", "1", *SMALL]
-    assert main([*command, "--minutes", "1e-9"]) == 0
-    with lock(Path("runs/cheetah-base-0"), "draft train"):
-        assert main(command) == BAD_INPUT
-    assert "another 'draft train' is running" in capsys.readouterr().err
-    assert main(command) == 0
-
-
-@needs_mjlab
-@pytest.mark.usefixtures("brief_review")
-def test_a_family_is_drawn_and_trained_in_one_simulation(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    vary = ["--vary", "thigh_length=0.2:0.3", "--bodies", "3", "--see-design"]
-    assert main(["train", "quadruped", *vary, "--iterations", "1", *SMALL]) == 0
-    assert "quadruped-3-bodies-base-0" in capsys.readouterr().out
+@pytest.mark.usefixtures("small_review")
+def test_a_family_is_drawn_and_trained_in_one_simulation(command: Command) -> None:
+    vary = "--vary thigh_length=0.2:0.3 --bodies 3 --see-design --iterations 1"
+    assert "quadruped-3-bodies-base-0" in command(f"train quadruped {vary}", *SMALL).out
     assert len(list(Path("runs/quadruped-3-bodies-base-0/designs").iterdir())) == 3
-    assert main(["train", "cheetah", "bear", "--iterations", "1", *SMALL]) == 0
+    command("train cheetah bear --iterations 1", *SMALL)
     assert Path("runs/cheetah-and-1-more-base-0/resume.pt").exists()
 
 
-def test_a_design_that_the_filter_refuses_is_not_trained(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert main(["train", "cheetah", "--set", "hip_offset=0.03"]) == REFUSED
-    assert "refused" in capsys.readouterr().err
-    assert not Path("runs").exists()
-
-
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("words", "said", "code"),
     [
-        (["chetah"], "did you mean 'cheetah'?"),
-        (["hopper"], "hopper cannot be trained: it has one leg with a knee and a foot"),
-        (["cheetah", "hopper"], "hopper cannot be trained"),
-        (["cheetah", "--iterations", "0"], "--iterations 0 is not a whole number from 1 to"),
-        (["cheetah", "--envs", "-4"], "--envs -4 is not a whole number from 1 to"),
-        (["cheetah", "--minutes", "nan"], "--minutes nan is not a number above 0"),
-        (["cheetah", "--seed", "-1"], "--seed -1 is not a whole number from 0"),
-        (["cheetah", "--set", "rewards.heigt=3"], "did you mean 'rewards.height'?"),
-        (["cheetah", "--set", "rewards.height=tall"], "'tall' is not a value of rewards.height"),
-        (["cheetah", "--set", "ground.step=1,2,3"], "such as [0.0, 0.14]"),
-        (["cheetah", "--set", "learning.mirror=perhaps"], "such as false"),
-        (["cheetah", "--set", "velocity.pushed=3"], "velocity.pushed must be a share, 0 to 1"),
-        (["cheetah", "--set", "thigh=3"], "thigh_length"),
-        (["quadruped", "--vary", "thigh_length=0.2:0.3"], "--bodies is missing"),
-        (["cheetah", "--bodies", "5000"], "--bodies 5000 is not a whole number from 1 to 4096"),
-        (["quadruped", "--bodies", "3"], "--bodies draws designs, but nothing is varied"),
-        (["cheetah", "bear", "--envs", "1"], "1 world cannot hold 2 designs"),
-        (["cheetah", "--from", "nowhere"], "there is no policy 'nowhere' to start from"),
-        (["cheetah", "--from", "nowhere"], "name the folder of a run, an ONNX file, 'family'"),
-        (["cheetah", "--from", "nowhere.onnx"], "cannot read nowhere.onnx"),
-        (["humanoid", "--from", "family"], "does not drive the joints of humanoid"),
-        (["cheetah", "--out", " "], "--out names no folder"),
-        (["cheetah", "--stage", "push"], "--from scratch"),
+        ("cheetah --set hip_offset=0.03", "refused", REFUSED),
+        *(
+            (*case, BAD_INPUT)
+            for case in (
+                ("chetah", "did you mean 'cheetah'?"),
+                ("hopper", "hopper cannot be trained: it has one leg with a knee and a foot"),
+                ("cheetah hopper", "hopper cannot be trained"),
+                ("robot", "monoped cannot be trained"),
+                # Ranges of numbers: tests/learn/test_training_options.py.
+                ("cheetah --minutes nan", "--minutes nan is not a number above 0"),
+                ("cheetah --set rewards.heigt=3", "did you mean 'rewards.height'?"),
+                ("cheetah --set rewards.height=tall", "'tall' is not a value of rewards.height"),
+                ("cheetah --set ground.step=1,2,3", "such as [0.0, 0.14]"),
+                ("cheetah --set learning.mirror=perhaps", "such as false"),
+                ("cheetah --set velocity.pushed=3", "velocity.pushed must be a share, 0 to 1"),
+                ("cheetah --set thigh=3", "thigh_length"),
+                ("quadruped --vary thigh_length=0.2:0.3", "--bodies is missing"),
+                ("cheetah --bodies 5000", "--bodies 5000 is not a whole number from 1 to 4096"),
+                ("quadruped --bodies 3", "--bodies draws designs, but nothing is varied"),
+                ("cheetah bear --envs 1", "1 world cannot hold 2 designs"),
+                ("cheetah --from nowhere", "there is no policy 'nowhere' to start from"),
+                ("cheetah --from nowhere", "name the folder of a run, an ONNX file, 'family'"),
+                ("cheetah --from nowhere.onnx", "cannot read nowhere.onnx"),
+                ("humanoid --from family", "does not drive the joints of humanoid"),
+                ("cheetah --out ' '", "--out names no folder"),
+                ("cheetah --stage push", "--from scratch"),
+            )
+        ),
     ],
 )
 def test_what_cannot_be_trained_is_explained(
-    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+    words: str, said: str, code: int, command: Command
 ) -> None:
-    if "--from" in arguments or "--out" in arguments or "--stage" in arguments:
+    if any(option in words for option in ("--from", "--out", "--stage")):
         pytest.importorskip("torch")
-    assert main(["train", *arguments]) == BAD_INPUT
-    said = capsys.readouterr().err
-    assert words in said
-    assert "Traceback" not in said
+    assert said in command(f"train {words}", code=code).err
     assert not Path("runs").exists()
-
-
-def test_without_the_extra_its_name_is_reported(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "torch", None)
-    assert main(["train", "cheetah"]) == BAD_INPUT
-    assert remedy("learn") in capsys.readouterr().err
-    assert not Path("runs").exists()
-
-
-def test_a_robot_of_ones_own_is_refused_with_its_reason(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    write_robot(Path("mine"))
-    edit(Path("mine"), "parameters.yaml", "name: monoped", "name: mine")
-    assert main(["train", "mine"]) == BAD_INPUT
-    assert "mine cannot be trained" in capsys.readouterr().err

@@ -9,10 +9,10 @@ import pytest
 import yaml
 
 import draft
-from draft.cli import main
 from draft.errors import DraftError
 from draft.laws.actuators import FILE
 from draft.laws.catalogue import FILE as CATALOGUE
+from tests.commands import Command
 
 HEADER = "name,vendor,family,peak_torque_nm,no_load_speed_rad_s,gear_ratio,mass_kg,diameter_mm,"
 HEADER += "length_mm,rotor_inertia_kg_m2,source\n"
@@ -29,22 +29,20 @@ def _table(*rows: str) -> str:
     return "extra.csv"
 
 
-def test_the_table_shows_published_and_reproduced_figures_side_by_side(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert main(["trends", "table"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def _add(line: str) -> None:
+    with Path("robot/parameters.yaml").open("a", encoding="utf-8") as file:
+        file.write(f"{line}\n")
+
+
+def test_the_table_shows_published_and_reproduced_figures_side_by_side(command: Command) -> None:
+    lines = command("trends table").out.splitlines()
     assert lines[0].split() == [
         *("quantity", "figure", "published", "source", "reproduced", "draft")
     ]
     assert any(line.split()[-5:] == ["1.31", "paper", "1.31", "same", "1.242"] for line in lines)
     assert sum(" differs " in line for line in lines) == 1
     assert any(line.split()[-4:] == ["released", "data", "0.666", "same"] for line in lines)
-
-
-def test_the_table_as_json_has_the_same_figures(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["trends", "table", "--json"]) == 0
-    figures = json.loads(capsys.readouterr().out)["actuators"]
+    figures = command.json("trends table")["actuators"]
     (mass,) = [
         f for f in figures if (f["quantity"], f["figure"]) == ("mass", "error, vendor held out")
     ]
@@ -54,60 +52,43 @@ def test_the_table_as_json_has_the_same_figures(capsys: pytest.CaptureFixture[st
 
 
 def test_the_check_of_the_shipped_catalogue_names_the_rows_that_sources_contradict(
-    capsys: pytest.CaptureFixture[str],
+    command: Command,
 ) -> None:
-    assert main(["trends", "check"]) == 0
-    out = capsys.readouterr().out
+    out = command("trends check").out
     assert out.endswith("114 modules, 4 doubts\n")
     assert "contradicted: AK80-64: two sources give 0.85 kg, not 1.40 kg" in out
 
 
-def test_a_slip_of_units_is_reported_with_file_and_row(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["trends", "check", "--catalogue", _table("good", "grams")]) == 1
-    out = capsys.readouterr().out
+def test_wrong_rows_are_reported_with_their_file_and_row(command: Command) -> None:
+    table = _table("good", "grams")
+    out = command(f"trends check --catalogue {table}", code=1).out
     assert "extra.csv:3: unit slip: M2: mass 450 kg, where such modules have about" in out
     assert "perhaps grams, not kilograms" in out
-    assert main(["trends", "check", "--json", "--catalogue", "extra.csv"]) == 1
-    (doubt,) = json.loads(capsys.readouterr().out)["doubts"]
+    (doubt,) = command.json(f"trends check --catalogue {table}", code=1)["doubts"]
     assert (doubt["kind"], doubt["file"], doubt["line"]) == ("unit_slip", "extra.csv", 3)
-
-
-def test_a_refused_row_ends_with_code_2_and_its_place(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["trends", "fit", "--catalogue", _table("good", "blank"), "--out", "x.json"]) == 2
-    err = capsys.readouterr().err
+    table = _table("good", "blank")
+    err = command(f"trends fit --catalogue {table} --out x.json", code=2).err
     assert "extra.csv:3: mass_kg of 'M3' is missing" in err
     assert not Path("x.json").exists()
-
-
-def test_a_skipped_cell_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["trends", "check", "--catalogue", _table("skipped")])
-    err = capsys.readouterr().err
+    err = command(f"trends check --catalogue {_table('skipped')}").err
     assert "warning: extra.csv:2: rotor_inertia_kg_m2 of 'M4' is -1, not above zero: skipped" in err
 
 
 @pytest.mark.slow
-def test_a_robot_can_use_laws_refitted_with_rows_of_its_own(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_robot_can_use_laws_refitted_with_rows_of_its_own(command: Command) -> None:
     robot = Path("robot")
     shipped = FILE.read_bytes()
-    fit = ["trends", "fit", "--catalogue", _table("good"), "--out", "robot/mine.json"]
-    assert main(fit) == 0
-    assert "from 115 modules" in capsys.readouterr().out
+    fit = f"trends fit --catalogue {_table('good')}"
+    assert "from 115 modules" in command(f"{fit} --out robot/mine.json").out
+    assert "written to trends.json" in command(fit).out
+    assert Path("trends.json").is_file()
     assert FILE.read_bytes() == shipped
     before = draft.load(robot).resolve().actuators["leg"].mass
-    file = robot / "parameters.yaml"
-    file.write_text(file.read_text(encoding="utf-8") + "trends: mine.json\n", encoding="utf-8")
+    _add("trends: mine.json")
     leg = draft.load(robot).resolve().actuators["leg"]
     assert leg.laws.name == "mine.json"
     assert leg.mass == pytest.approx(before, rel=0.05)
     assert leg.mass != before
-
-
-def test_rows_of_ones_own_never_overwrite_the_package(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["trends", "fit", "--catalogue", _table("good")]) == 0
-    assert "written to trends.json" in capsys.readouterr().out
-    assert Path("trends.json").is_file()
 
 
 def test_a_robot_picks_its_set_of_laws() -> None:
@@ -123,12 +104,11 @@ def test_a_robot_picks_its_set_of_laws() -> None:
     assert masses[None] == masses["draft"] != masses["paper"]
 
 
-def test_a_robot_can_use_structure_trends_fitted_to_other_robots() -> None:
+def test_a_robot_can_use_structure_trends_fitted_to_other_robots(command: Command) -> None:
     robot = Path("robot")
     before = draft.load(robot).resolve()
-    assert main(["survey", "fit", "--out", "robot/mine.json"]) == 0
-    file = robot / "parameters.yaml"
-    file.write_text(file.read_text(encoding="utf-8") + "structure: mine.json\n", encoding="utf-8")
+    command("survey fit --out robot/mine.json")
+    _add("structure: mine.json")
     assert draft.load(robot).resolve().mass == pytest.approx(before.mass, rel=1e-9)
     own = json.loads(Path("robot/mine.json").read_text(encoding="utf-8"))
     for people in ("humanoid", "quadruped"):
@@ -140,61 +120,44 @@ def test_a_robot_can_use_structure_trends_fitted_to_other_robots() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "words"),
+    ("line", "words"),
     [
         (
-            "../mine.json",
+            "structure: ../mine.json",
             r"parameters.yaml:\d+:12: .*expected calibrated, paper or the name of a .json",
         ),
-        ("none.json", "none.json: cannot be read: no such file"),
-        ("bad.json", "bad.json: holds no structure trends of"),
+        ("structure: none.json", "none.json: cannot be read: no such file"),
+        ("structure: bad.json", "bad.json: holds no structure trends of"),
+        *(
+            (f"trends: {value}", r"parameters.yaml:\d+:9: .*expected draft, paper or")
+            for value in ("best", "../mine.json", "a/b.json", "3", "[draft]")
+        ),
     ],
 )
-def test_structure_trends_that_cannot_be_used_are_named(value: str, words: str) -> None:
-    robot = Path("robot")
-    (robot / "bad.json").write_text('{"humanoid": 3}', encoding="utf-8")
-    file = robot / "parameters.yaml"
-    file.write_text(file.read_text(encoding="utf-8") + f"structure: {value}\n", encoding="utf-8")
+def test_trends_that_cannot_be_used_are_named(line: str, words: str) -> None:
+    Path("robot/bad.json").write_text('{"humanoid": 3}', encoding="utf-8")
+    _add(line)
     with pytest.raises(DraftError, match=words):
-        draft.load(robot).resolve()
-
-
-@pytest.mark.parametrize("value", ["best", "../mine.json", "a/b.json", "3", "[draft]"])
-def test_a_set_of_laws_that_does_not_exist_is_refused_at_its_line(value: str) -> None:
-    robot = Path("robot")
-    file = robot / "parameters.yaml"
-    file.write_text(file.read_text(encoding="utf-8") + f"trends: {value}\n", encoding="utf-8")
-    with pytest.raises(DraftError, match=r"parameters.yaml:\d+:9: .*expected draft, paper or"):
-        draft.load(robot)
+        draft.load("robot").resolve()
 
 
 @pytest.mark.slow
-def test_figures_are_written_as_png_and_pdf(capsys: pytest.CaptureFixture[str]) -> None:
+def test_figures_are_written_as_png_and_pdf(command: Command) -> None:
     pytest.importorskip("matplotlib")
-    assert main(["trends", "figures", "--out", "figures"]) == 0
+    out = command("trends figures --out figures").out
     names = {path.name for path in Path("figures").iterdir()}
     kinds = {"actuator_relations", "actuator_predicted", "held_out_errors"}
     kinds |= {"structure_by_class", "structure_predicted"}
     assert names == {f"{kind}.{end}" for kind in kinds for end in ("png", "pdf")}
     assert all(path.stat().st_size > 5000 for path in Path("figures").iterdir())
-    assert Path(capsys.readouterr().out.splitlines()[0]).exists()
-
-
-@pytest.mark.slow
-def test_a_folder_that_cannot_be_written_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("matplotlib")
+    assert Path(out.splitlines()[0]).exists()
     Path("file").write_text("", encoding="utf-8")
-    assert main(["trends", "figures", "--out", "file"]) == 2
-    assert "cannot write file" in capsys.readouterr().err
-    assert main(["trends", "fit", "--out", "file/here.json"]) == 2
-    assert "cannot write file/here.json" in capsys.readouterr().err
+    assert "cannot write file" in command("trends figures --out file", code=2).err
+    assert "cannot write file/here.json" in command("trends fit --out file/here.json", code=2).err
 
 
-def test_a_robot_names_modules_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["new", "mine", "--like", "hopper"]) == 0
+def test_a_robot_names_modules_of_its_own(command: Command) -> None:
+    command("new mine --like hopper")
     path = Path("mine/parameters.yaml")
     text = path.read_text()
     header = CATALOGUE.read_text().splitlines()[0]
@@ -202,11 +165,10 @@ def test_a_robot_names_modules_of_its_own(
     row = dict(zip(header.split(","), numbers, strict=False)) | {"source": "https://example.com"}
     line = ",".join(row.get(name, "") for name in header.split(","))
     Path("mine/mine.csv").write_text(f"{header}\n{line}\n")
-    strong = ["check", "mine", "--set", "actuators.leg.like=super_x"]
-    assert main(strong) == 2
+    strong = "check mine --set actuators.leg.like=super_x"
+    command(strong, code=2)
     path.write_text(text.replace("population:", "catalogue: mine.csv\npopulation:", 1))
-    assert main(strong) == 0
+    command(strong)
     for wrong in ("../mine.csv", "mine.json", "gone.csv"):
         path.write_text(text.replace("population:", f"catalogue: {wrong}\npopulation:", 1))
-        assert main(["check", "mine"]) == 2
-    assert "gone.csv" in capsys.readouterr().err
+        assert wrong in command.refuses("check mine")

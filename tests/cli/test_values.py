@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from draft.cli import main
+from tests.commands import Command
+
+SCREEN = "screen bear --vary thigh_length=0.2:0.3 --out s --n"
 
 
 @pytest.mark.parametrize(
@@ -14,16 +16,20 @@ from draft.cli import main
         ("show quadruped --payload None", "--payload: expected a number, not 'None'"),
         ("play cheetah --kick hard", "--kick: expected a number, not 'hard'"),
         ("train cheetah --iterations 1.5", "--iterations: expected a whole number, not '1.5'"),
+        *(
+            (f"{SCREEN} {n}", f"--n: expected a whole number, not '{n}'")
+            for n in ("1.5", "many", "inf", "nan")
+        ),
         ("play cheetah --skill fly", "Expected one of ('walk', 'run', 'climb', 'push')."),
         ("import x.urdf --population None", "Expected one of ('humanoid', 'quadruped')."),
+        ("export bear --format step", "Expected one of ('urdf', 'glb', 'mjcf')."),
+        ("learn show --recipe lapto", "Expected one of ('paper', 'laptop', 'tune')."),
+        ("evaluate r --errors papr", "Expected one of ('twins', 'survey', 'paper')."),
     ],
 )
 def test_a_word_that_is_no_value_is_named_with_what_was_expected(
-    words: str, said: str, capsys: pytest.CaptureFixture[str]
+    words: str, said: str, command: Command
 ) -> None:
-    with pytest.raises(SystemExit) as left:
-        main(words.split())
-    assert left.value.code == 2
-    told = " ".join(capsys.readouterr().err.replace("│", " ").split())
+    told = " ".join(command.refuses(words).replace("│", " ").split())
     assert said in told
     assert "None" not in told.replace("'None'", "")

@@ -1,8 +1,9 @@
-"""Looking at a robot: on this machine only, and in words where that cannot be."""
+"""Looking at a robot: what is served, to whom, and what is said where that cannot be."""
 
 from __future__ import annotations
 
 import contextlib
+import shutil
 import socket
 import sys
 import types
@@ -11,9 +12,13 @@ from typing import Any
 import glfw
 import pytest
 
-from draft.cli import main
-from draft.extras import remedy
+from draft.learn.policy.policy import FAMILY
 from draft.serving import server
+from draft.spec.load import find
+from tests.commands import Command
+
+PAGES = ("view robot --web", "play cheetah --web", "studio --no-browser")
+TOKEN = "--token a-token-of-20-chars_"
 
 
 @pytest.fixture
@@ -46,56 +51,54 @@ def served(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return asked
 
 
-def test_the_page_is_served_to_this_machine_only(
-    served: dict[str, Any], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["view", "robot", "--web", "--port", "8123"]) == 130
+def test_the_page_is_served_to_this_machine_only(served: dict[str, Any], command: Command) -> None:
+    said = command("view robot --web --port 8123", code=130)
     assert (served["host"], served["port"]) == ("127.0.0.1", 8123)
     assert served["stopped"]
     assert served["bodies"] == 5
-    assert "http://127.0.0.1:8123" in capsys.readouterr().out
+    assert "http://127.0.0.1:8123" in said.out
 
 
-@pytest.mark.parametrize("port", ["99999999", "65536", "-5"])
-def test_a_port_out_of_range_is_refused(
-    port: str, served: dict[str, Any], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["view", "robot", "--web", f"--port={port}"]) == 2
-    assert capsys.readouterr().err == (
-        f"error: there is no port {port}\n  choose one from 0 to 65535\n"
-    )
-    assert not served
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        *(
+            (f"{page} --port={n}", f"there is no port {n}\n  choose one from 0 to 65535\n")
+            for page in PAGES
+            for n in (-5, 65536)
+        ),
+        *((f"{page} --host 0.0.0.0", "and there is no --token") for page in PAGES[1:]),
+        *(
+            (f"{page} --host 192.0.2.1 {TOKEN}", "cannot serve on 192.0.2.1 port 8080")
+            for page in PAGES[1:]
+        ),
+        ("studio no_such_robot --no-browser", "names no robot or design"),
+        ("studio quadruped:bear.yaml", "is a file, and the studio starts from named designs\n"),
+        (f"studio humanoid --policy {FAMILY}", "does not drive the joints of humanoid"),
+    ],
+)
+def test_a_page_that_cannot_be_served_is_refused(words: str, said: str, command: Command) -> None:
+    pytest.importorskip("mjviser")
+    shutil.copy(find("quadruped") / "designs/bear.yaml", "bear.yaml")
+    assert said in command(words, code=2).err
 
 
-def test_a_port_that_is_taken_is_explained(
-    served: dict[str, Any], capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.parametrize("page", PAGES)
+def test_a_port_that_is_taken_is_explained(page: str, command: Command) -> None:
+    pytest.importorskip("mjviser")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        assert main(["view", "robot", "--web", f"--port={port}"]) == 2
-    assert capsys.readouterr().err == (
+        err = command(f"{page} --port={port}", code=2).err
+    assert err.endswith(
         f"error: cannot serve on 127.0.0.1 port {port}: another page or program uses it\n"
         f"  end that one, or pass --port {port + 1}, or --port 0 for any free port\n"
     )
 
 
-@pytest.mark.parametrize("module", ["viser", "mjviser"])
-def test_without_the_extra_the_page_says_how_to_get_it(
-    module: str,
-    served: dict[str, Any],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setitem(sys.modules, module, None)
-    assert main(["view", "robot", "--web"]) == 2
-    assert remedy("view") in capsys.readouterr().err
-
-
 def test_without_a_screen_the_window_names_the_page(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     monkeypatch.setattr(glfw, "init", lambda: False)
-    assert main(["view", "robot"]) == 2
-    err = capsys.readouterr().err
+    err = command("view robot", code=2).err
     assert "there is no screen for MuJoCo's viewer" in err
     assert "add --web to use a browser" in err

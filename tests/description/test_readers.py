@@ -17,7 +17,7 @@ from draft.description import mjcf, urdf
 from draft.description.description import Description, Inertial
 from draft.description.read import describe
 from draft.description.rigid import box, combined, moved
-from draft.description.segments import segments
+from draft.description.segments import Segment, segments
 from draft.description.xmlfile import DescriptionError, read_text
 from tests.description import written
 from tests.description.written import joint, link
@@ -69,10 +69,22 @@ MODEL = """<mujoco model="tester"><compiler angle="degree" eulerseq="zyx"/>
 <actuator><motor joint="twist" gear="5" ctrlrange="-2 2"/></actuator></mujoco>"""
 
 
+ROBOT = _mjcf(MODEL)
+CUT = {one.name: one for one in segments(ROBOT)}
+
+
+def posed() -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """MuJoCo's own model, as the file shows it."""
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
 def test_masses_of_primitive_geoms_are_those_of_mujoco() -> None:
-    robot, model = _mjcf(MODEL), mujoco.MjModel.from_xml_string(MODEL)
+    model, _ = posed()
     for name in ("base", "thigh", "shank"):
-        ours, body = robot.links[name].inertial, model.body(name)
+        ours, body = ROBOT.links[name].inertial, model.body(name)
         assert ours is not None
         assert ours.mass == pytest.approx(body.mass[0], rel=1e-9)
         assert ours.com == pytest.approx(tuple(body.ipos), abs=1e-9)
@@ -81,26 +93,22 @@ def test_masses_of_primitive_geoms_are_those_of_mujoco() -> None:
 
 
 def test_places_of_mjcf_joints_are_those_of_mujoco() -> None:
-    robot, model = _mjcf(MODEL), mujoco.MjModel.from_xml_string(MODEL)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    distance = np.linalg.norm(data.joint("knee").xanchor - data.joint("hip").xanchor)
-    thigh = next(one for one in segments(robot) if one.name == "thigh")
-    assert thigh.length == pytest.approx(distance, rel=1e-9)
-    assert robot.joints["hip"].limits == pytest.approx((-math.pi / 2, math.pi / 2))
-    assert (robot.joints["hip"].effort, robot.joints["twist"].effort) == (30, 30)
+    _, data = posed()
+    hip, knee = data.joint("hip").xanchor, data.joint("knee").xanchor
+    assert CUT["thigh"].length == pytest.approx(np.linalg.norm(knee - hip), rel=1e-9)
+    joints = ROBOT.joints
+    assert joints["hip"].limits == pytest.approx((-math.pi / 2, math.pi / 2))
+    assert (joints["hip"].effort, joints["twist"].effort) == (30, 30)
+    # A segment's centre is counted from its joint, and not from its frame.
+    assert np.linalg.norm(hip - data.body("thigh").xpos) > 0.005
+    along = (data.body("thigh").xipos - hip) @ (knee - hip) / ((knee - hip) @ (knee - hip))
+    assert CUT["thigh"].centre == pytest.approx(along, abs=1e-6)
 
 
 def test_a_body_with_two_joints_becomes_a_chain() -> None:
-    robot = _mjcf(MODEL)
-    knee, twist = robot.joints["knee"], robot.joints["twist"]
-    assert (knee.parent, knee.child, twist.parent, twist.child) == (
-        "thigh",
-        "shank:1",
-        "shank:1",
-        "shank",
-    )
-    assert robot.links["shank:1"].inertial is None
+    ends = [(ROBOT.joints[name].parent, ROBOT.joints[name].child) for name in ("knee", "twist")]
+    assert ends == [("thigh", "shank:1"), ("shank:1", "shank")]
+    assert ROBOT.links["shank:1"].inertial is None
 
 
 @given(st.lists(st.tuples(st.floats(0.1, 5), points), min_size=1, max_size=5), points)
@@ -122,13 +130,8 @@ def test_the_box_with_a_boxs_inertia_is_that_box(
     mass: float, edges: tuple[float, float, float]
 ) -> None:
     a, b, c = edges
-    moments = (
-        mass * (b * b + c * c) / 12,
-        mass * (a * a + c * c) / 12,
-        mass * (a * a + b * b) / 12,
-    )
-    inertia = tuple(tuple(moments[i] if i == j else 0.0 for j in range(3)) for i in range(3))
-    found = box(Inertial(mass, (0.0, 0.0, 0.0), inertia))  # type: ignore[arg-type]
+    xx, yy, zz = (mass * (x * x + y * y) / 12 for x, y in ((b, c), (a, c), (a, b)))
+    found = box(Inertial(mass, (0.0, 0.0, 0.0), ((xx, 0.0, 0.0), (0.0, yy, 0.0), (0.0, 0.0, zz))))
     assert found == pytest.approx(tuple(sorted(edges, reverse=True)), rel=1e-6)
 
 
@@ -139,6 +142,9 @@ def test_segments_conserve_mass_and_measure_joint_to_joint() -> None:
     assert cut["thigh"].length == pytest.approx(0.3)
     edge = math.sqrt(6 * 0.01 / 1.0)
     assert cut["foot"].length == pytest.approx(edge)
+    # The segment that is measured by its box and the root have no centre.
+    assert math.isnan(cut["foot"].centre)
+    assert math.isnan(cut["pelvis"].centre)
 
 
 @given(st.floats(-0.5, 1.5), points)
@@ -153,69 +159,33 @@ def test_a_segments_centre_is_the_share_of_its_length_at_which_it_balances(
     assert cut["shank"].centre == pytest.approx(0.5)
 
 
-def test_a_segment_measured_by_its_box_and_the_root_have_no_centre() -> None:
-    cut = {one.name: one for one in segments(_urdf(written.leg()))}
-    assert math.isnan(cut["foot"].centre)
-    assert math.isnan(cut["pelvis"].centre)
+def robot(links: str, *joints: tuple[str, ...]) -> list[Segment]:
+    """Segments of links with a mass, and of joints."""
+    return segments(_urdf(written.urdf(links + "".join(joint(*one) for one in joints))))
 
 
-def test_the_centre_of_an_mjcf_segment_starts_at_its_joint_and_not_at_its_frame() -> None:
-    robot, model = _mjcf(MODEL), mujoco.MjModel.from_xml_string(MODEL)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    hip, knee = data.joint("hip").xanchor, data.joint("knee").xanchor
-    assert np.linalg.norm(hip - data.body("thigh").xpos) > 0.005
-    along = (data.body("thigh").xipos - hip) @ (knee - hip) / ((knee - hip) @ (knee - hip))
-    thigh = next(one for one in segments(robot) if one.name == "thigh")
-    assert thigh.centre == pytest.approx(along, abs=1e-6)
-
-
-def _pair(gap: float) -> Description:
-    return _urdf(
-        written.urdf(
-            link("base")
-            + link("a")
-            + link("b")
-            + joint("hip_roll", "base", "a", "0 0 -0.5")
-            + joint("hip_pitch", "a", "b", f"0 0 -{gap}")
-        )
-    )
-
-
-def test_a_joint_closer_than_two_centimetres_joins_its_parents_segment() -> None:
-    assert [one.name for one in segments(_pair(0.0199))] == ["base", "a"]
-
-
-def test_a_joint_at_exactly_two_centimetres_stays_apart() -> None:
-    assert [one.name for one in segments(_pair(0.02))] == ["base", "a", "b"]
+@pytest.mark.parametrize(("gap", "kept"), [("0.0199", ["base", "a"]), ("0.02", ["base", "a", "b"])])
+def test_a_joint_closer_than_two_centimetres_joins_its_parents_segment(
+    gap: str, kept: list[str]
+) -> None:
+    above = ("hip_roll", "base", "a", "0 0 -0.5")
+    cut = robot(link("base") + link("a") + link("b"), above, ("x", "a", "b", f"0 0 -{gap}"))
+    assert [one.name for one in cut] == kept
 
 
 def test_fixed_links_belong_to_their_parents_segment_and_reach_as_far_as_they_do() -> None:
-    robot = _urdf(
-        written.urdf(
-            link("base")
-            + link("hand")
-            + link("tip", None)
-            + joint("wrist", "base", "hand")
-            + joint("tip_frame", "hand", "tip", "0 0 -0.17", "fixed")
-        )
-    )
-    hand = segments(robot)[1]
+    links = link("base") + link("hand") + link("tip", None)
+    frame = ("tip_frame", "hand", "tip", "0 0 -0.17", "fixed")
+    hand = robot(links, ("wrist", "base", "hand"), frame)[1]
     assert hand.links == ("hand", "tip")
     assert hand.length == pytest.approx(0.17)
 
 
 def test_a_robot_on_a_floating_joint_is_that_robot() -> None:
-    robot = _urdf(
-        written.urdf(
-            link("world", None)
-            + link("base")
-            + link("a")
-            + joint("free", "world", "base", "0 0 1", "floating")
-            + joint("hip", "base", "a", "0 0 -0.01")
-        )
-    )
-    assert [one.name for one in segments(robot)] == ["world"]
+    free = ("free", "world", "base", "0 0 1", "floating")
+    links = link("world", None) + link("base") + link("a")
+    cut = robot(links, free, ("hip", "base", "a", "0 0 -0.01"))
+    assert [one.name for one in cut] == ["world"]
 
 
 BASE = '<mujoco><include file="parts/defaults.xml"/><worldbody>{}</worldbody></mujoco>'
@@ -279,12 +249,8 @@ def test_a_joint_that_an_equality_couples_follows_the_other() -> None:
 
 
 def test_a_second_way_to_a_link_is_a_loop_that_is_cut_where_the_tree_is_shortest() -> None:
-    links = "\n".join(link(name) for name in "abcd")
-    found = _urdf(
-        written.urdf(
-            f"{links}\n{joint('x', 'a', 'b')}\n{joint('rod', 'a', 'd')}\n{joint('y', 'b', 'c')}\n"
-            f"{joint('z', 'c', 'd')}"
-        )
-    )
+    ends = {"x": "ab", "rod": "ad", "y": "bc", "z": "cd"}
+    parts = [*map(link, "abcd"), *(joint(name, *pair) for name, pair in ends.items())]
+    found = _urdf(written.urdf("\n".join(parts)))
     assert list(found.joints) == ["x", "y", "z"]
     assert [(loop.name, loop.links) for loop in found.loops] == [("rod", ("a", "d"))]

@@ -94,15 +94,6 @@ def test_speed_and_reduction_alone_get_the_usual_torque(speed: float, ratio: flo
     assert a.origins["peak_torque"].trend == "peak_torque"
 
 
-def test_a_radius_a_length_and_a_shape_at_once_are_an_error() -> None:
-    stated = {"peak_torque": 60.0, "gear_ratio": 9.0, "radius": 0.05, "length": 0.05}
-    assert size("leg", stated, None).aspect_ratio == 0.5
-    with pytest.raises(
-        ResolveError, match="radius, length, aspect_ratio: any two determine the third"
-    ):
-        size("leg", {**stated, "aspect_ratio": 0.5}, None)
-
-
 @pytest.mark.parametrize("name", PARTS)
 def test_a_class_like_a_part_has_exactly_the_parts_measured_values(name: str) -> None:
     part = catalogue()[name]

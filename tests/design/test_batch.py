@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import draft
+from draft.design.bands import actuator_bands
+from draft.design.battery import battery
+from draft.metrics import of_design, payload_for
+from tests.design.test_battery import with_battery
 from tests.helpers import leg, parameter, robot
+from tests.model.test_slides import telescope
 
 QUADRUPED = draft.load("quadruped")
 RANGES: dict[str, tuple[float, float]] = {
@@ -78,17 +85,72 @@ def _said(design: draft.Design, i: int | None = None) -> dict[tuple[str, str, st
     return {key: True for key, holds in said.items() if holds}
 
 
-def _check_same(spec: draft.Spec, table: dict[str, Any], count: int) -> None:
+def _check_same(
+    spec: draft.Spec,
+    table: dict[str, Any],
+    count: int,
+    numbers_of: Callable[[draft.Design], dict[str, Any]] = _numbers,
+) -> None:
     many = spec.resolve(table)
     assert many.count == count
-    numbers = _numbers(many)
+    numbers = numbers_of(many)
     for i in range(count):
         one = spec.resolve(_row(table, i))
-        for name, expected in _numbers(one).items():
+        for name, expected in numbers_of(one).items():
             value = _pick(numbers[name], count, i)
-            assert value == pytest.approx(expected, rel=1e-12, abs=1e-14), name
+            assert value == pytest.approx(expected, rel=1e-12, abs=1e-14, nan_ok=True), name
         assert _said(many, i) == _said(one)
         assert _pick(many.accepted, count, i) == one.accepted
+
+
+def _told(design: draft.Design) -> dict[str, Any]:
+    """Numbers, metrics and bands of a design, by name."""
+    bands = {"mass": design.mass_band(), "payload for a minute": payload_for(design, 60.0)}
+    bands["energy"] = battery(design).band
+    for name, actuator in design.actuators.items():
+        bands |= {f"{name}.{of}": band for of, band in actuator_bands(actuator).items()}
+    found = _numbers(design) | of_design(design)
+    return found | {f"band of {k} {i}": x for k, band in bands.items() for i, x in enumerate(band)}
+
+
+KEY = "actuators.leg."
+CHEETAH, BEAR = (dict(QUADRUPED.designs[name].values) for name in ("cheetah", "bear"))
+# A robot, and what varies: laws change at their ends, findings come and go.
+VARIED: dict[str, tuple[draft.Spec, dict[str, Any]]] = {
+    "legs inside and outside the survey": (
+        replace(QUADRUPED, structure="calibrated"),
+        {"thigh_length": [0.1, 0.25, 0.6]},
+    ),
+    "corner speeds": (
+        QUADRUPED,
+        CHEETAH | {KEY + "corner_speed": [0.0, 5.0, 22.0, 39.0], "payload": 20.0},
+    ),
+    "payloads": (QUADRUPED, BEAR | {"payload": [0.0, 2.0, 50.0]}),
+    "torques of servos and of modules": (
+        QUADRUPED,
+        {KEY + "like": None, KEY + "peak_torque": [2.0, 4.2, 30.0, 72.0, 200.0]},
+    ),
+    "reductions with different laws of the rated torque": (
+        robot(),
+        {KEY + "peak_torque": [50.0, 60.0, 70.0, 80.0], KEY + "gear_ratio": [10.0, 49, 50, 100]},
+    ),
+    "rated torques below that of standing": (QUADRUPED, {KEY + "rated_torque": [5.0, 30.0]}),
+    "masses in another unit": (QUADRUPED, {KEY + "mass": [1.1, 1100.0, 0.5, 40.0]}),
+    "batteries": (with_battery("{energy: 1000 * trunk_length}"), {"trunk_length": [0.4, 0.6]}),
+    "a humanoid": (draft.load("humanoid"), {"thigh_length": [0.15, 0.2, 0.3]}),
+    "a hopper": (draft.load("hopper"), {"shin_length": [0.2, 0.3], "payload": [0.0, 30.0]}),
+    "homes of a slide": (
+        robot(telescope(home="out"), parameters={"out": parameter(0.0, -1, 1)}),
+        {"out": [-0.05, 0.0, 0.08]},
+    ),
+}
+
+
+@pytest.mark.parametrize(("spec", "table"), VARIED.values(), ids=VARIED)
+def test_what_is_told_of_many_is_told_of_each(spec: draft.Spec, table: dict[str, Any]) -> None:
+    arrays = {key: np.array(x) if isinstance(x, list) else x for key, x in table.items()}
+    count = max(len(x) for x in arrays.values() if isinstance(x, np.ndarray))
+    _check_same(spec, arrays, count, _told)
 
 
 @settings(max_examples=60)
@@ -154,6 +216,7 @@ BENT = {
 rows = st.fixed_dictionaries({k: st.one_of(st.floats(*v), st.just(v[0])) for k, v in BENT.items()})
 
 
+@pytest.mark.slow
 @given(st.lists(rows, min_size=1, max_size=5), st.sets(st.sampled_from(sorted(BENT)), min_size=1))
 def test_canted_axes_and_rotated_links_of_many_are_those_of_each(
     drawn: list[dict[str, float]], varied: set[str]
@@ -185,6 +248,14 @@ def test_a_row_with_a_number_that_cannot_be_is_marked_and_alone_is_an_error(
     with pytest.raises(draft.ResolveError):
         spec.resolve({"x": bad})
     assert spec.resolve({"x": 2.0}).count is None
+
+
+@pytest.mark.parametrize(
+    ("key", "good", "bad"), [("corner_speed", 5.0, 400.0), ("rated_torque", 20.0, 80.0)]
+)
+def test_a_row_with_a_quantity_beyond_another_is_marked(key: str, good: float, bad: float) -> None:
+    many = QUADRUPED.resolve({KEY + key: np.array([good, bad])})
+    assert list(np.asarray(many.accepted)) == [True, False]
 
 
 def test_a_derived_parameter_out_of_its_bounds_marks_its_row() -> None:
@@ -255,6 +326,7 @@ def test_what_is_no_number_is_an_error_in_python_too(values: Any, cause: str) ->
     assert caught.value.problems[0].cause == cause
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(tables())
 def test_an_indexed_design_is_the_design_resolved_alone(

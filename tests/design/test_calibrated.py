@@ -163,13 +163,6 @@ def test_a_band_is_that_of_the_law() -> None:
     assert high / low < published.high / published.low
 
 
-def test_many_designs_weigh_what_each_does() -> None:
-    lengths = np.array([0.1, 0.25, 0.6])
-    many = CALIBRATED.resolve({"thigh_length": lengths})
-    each = [CALIBRATED.resolve({"thigh_length": float(x)}).mass for x in lengths]
-    assert np.asarray(many.mass) == pytest.approx(each, rel=1e-12)
-
-
 def test_a_robot_without_thigh_and_shank_keeps_the_published_density() -> None:
     arm = robot(leg(thigh={"link": {"axis": "-z", "length": 0.3, "mass": 1.0}}))
     assert arm.resolve().leg_length is None

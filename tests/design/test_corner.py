@@ -126,15 +126,6 @@ def test_corners_of_parts_are_those_of_the_table_at_the_speed_of_the_catalogue()
             assert part.corner_speed == float(row["corner_speed_rad_s"])
 
 
-def test_n_designs_have_the_numbers_of_each() -> None:
-    corners = np.array([0.0, 5.0, 22.0, 39.0])
-    many = of_design(QUADRUPED.resolve("cheetah", {KEY: corners, "payload": 20.0}))
-    for i, corner in enumerate(corners.tolist()):
-        one = of_design(QUADRUPED.resolve("cheetah", {KEY: corner, "payload": 20.0}))
-        for name, value in one.items():
-            assert np.asarray(many[name])[i] == pytest.approx(value, rel=1e-12), name
-
-
 @given(st.floats(0.5, 38.0))
 def test_a_later_corner_jumps_higher_stands_cooler_and_runs_no_slower(corner: float) -> None:
     values = {KEY: np.array([0.0, corner, corner + 1]), "payload": 60.0}
@@ -194,37 +185,6 @@ def test_a_class_states_it_in_its_file_and_expressions_read_it(tmp_path: Path) -
     assert not spec.resolve({KEY: None}).actuators["leg"].has_corner
     assert spec.resolve({KEY: 8}).actuators["leg"].corner_speed == 8
     assert design_file(spec.resolve({KEY: None}))["values"][KEY] is None
-
-
-@pytest.mark.parametrize("corner", [20.0, 25.0])
-def test_a_corner_at_or_above_the_no_load_speed_is_refused(tmp_path: Path, corner: float) -> None:
-    folder = write_robot(tmp_path / "robot")
-    file = folder / "parameters.yaml"
-    text = file.read_text(encoding="utf-8")
-    written = text.replace("gear_ratio: 15", f"gear_ratio: 15\n    corner_speed: {corner}")
-    file.write_text(written, encoding="utf-8")
-    line = 1 + written.split("\n").index(f"    corner_speed: {corner}")
-    with pytest.raises(draft.DraftError) as caught:
-        draft.load(folder).resolve()
-    (problem,) = caught.value.problems
-    assert f"corner speed at {corner:g} rad/s, and its no-load speed is 20" in problem.cause
-    assert problem.where is not None
-    assert problem.where.line == line
-    assert "state a lower one, 'trend'" in problem.remedy
-    many = QUADRUPED.resolve({KEY: np.array([5.0, 400.0])})
-    assert list(np.asarray(many.accepted)) == [True, False]
-
-
-@pytest.mark.parametrize(("quantity", "word"), [("corner_speed", "trends"), ("mass", "trend")])
-def test_the_word_trend_is_explained_where_it_is_no_value(quantity: str, word: str) -> None:
-    with pytest.raises(draft.DraftError, match=f"unknown name '{word}'") as caught:
-        QUADRUPED.resolve({f"actuators.leg.{quantity}": word})
-    assert "only corner_speed takes the word 'trend'; " in caught.value.problems[0].remedy
-
-
-def test_a_negative_corner_is_refused() -> None:
-    with pytest.raises(draft.DraftError, match="corner_speed is -1: it must not be negative"):
-        QUADRUPED.resolve({KEY: -1})
 
 
 def test_torque_or_speed_cannot_follow_from_the_power_of_a_motor_with_a_corner() -> None:

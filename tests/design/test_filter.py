@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -284,13 +283,6 @@ def test_actuators_bolted_together_are_refused_where_they_meet(
     assert ("actuator_overlap" in ids(design)) == refused
 
 
-@pytest.mark.parametrize("name", QUADRUPED.designs)
-def test_the_shipped_designs_pass(name: str) -> None:
-    design = QUADRUPED.resolve(name)
-    assert design.accepted
-    assert not ids(design) & ERRORS
-
-
 @pytest.mark.parametrize("name", [None, *QUADRUPED.designs])
 def test_ten_times_the_torque_is_refused_by_the_classs_name(name: str | None) -> None:
     torque = QUADRUPED.resolve(name).actuators["leg"].peak_torque
@@ -325,15 +317,6 @@ def test_an_error_that_is_not_the_allowed_one_refuses(allow: list[str]) -> None:
     assert "add 'torque:leg' to 'allow'" in finding.remedy
     with pytest.raises(draft.RefusedError):
         design.build()
-
-
-@pytest.mark.parametrize("item", ["torq", "not_physical", "torq:leg"])
-def test_allowing_what_is_no_finding_is_an_error_with_its_place(item: str) -> None:
-    with pytest.raises(draft.ResolveError, match="'allow' names no finding") as error:
-        robot(allow=[item]).resolve()
-    where: Any = error.value.problems[0].where
-    assert where.file.endswith("parameters.yaml")
-    assert where.line is not None
 
 
 def test_only_errors_have_a_remedy_and_every_kind_is_explained() -> None:
@@ -377,20 +360,6 @@ def test_an_actuator_class_that_no_joint_uses_is_remarked_on() -> None:
     spec = robot(actuators={"leg": DRIVE, "spare": DRIVE})
     (found,) = [f for f in spec.resolve().findings if f.id == "unused_class"]
     assert (found.where, found.severity) == ("spare", "warning")
-
-
-@pytest.mark.parametrize("name", draft.shipped())
-def test_places_of_many_designs_are_judged_one_by_one(name: str) -> None:
-    spec = draft.load(name)
-    some = next(key for key in spec.parameters if spec.parameters[key].value.constant is not None)
-    value = spec.parameters[some].value.constant or 0.0
-    many = spec.resolve({some: np.array([value, value * 1.05])})
-    kinds = {"below_floor", "trunk_section", "thermal"}
-    for i in range(2):
-        together = {
-            (f.id, f.where) for f in many.findings if f.id in kinds and np.asarray(f.mask)[i]
-        }
-        assert together == {(f.id, f.where) for f in many[i].findings if f.id in kinds}
 
 
 @pytest.mark.parametrize(("at", "remark"), [(None, False), (-0.3, False), (-0.2, True)])

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 import draft
-from draft.errors import ResolveError
-from tests.helpers import leg, robot
 
 
 def test_a_design_keeps_its_numbers_when_the_callers_array_changes():
@@ -22,12 +20,6 @@ def test_a_caller_cannot_write_into_the_faces_that_lofts_share():
     loft = draft.load("quadruped").resolve().trunk.loft
     with pytest.raises(ValueError, match="read-only"):
         loft.faces()[0] = 0
-
-
-def test_a_joint_that_moves_nothing_that_weighs_is_an_error_at_its_place():
-    chain = leg(shank={"type": None, "sphere": None, "link": None})
-    with pytest.raises(ResolveError, match=r"tree\.yaml:\d+:\d+: 'shank' moves but has no mass"):
-        robot(chain).resolve()
 
 
 def test_the_report_tells_a_second_opinion_on_the_mass():

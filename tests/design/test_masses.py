@@ -212,12 +212,6 @@ def test_trunk_mass_grows_with_the_cube_of_its_size(scale: float) -> None:
     assert BOX["axis"] == spec.root.axis
 
 
-def test_a_passive_tail_without_mass_of_its_own_is_refused_with_the_classes() -> None:
-    tail = {"name": "tail", "joint": {"name": "wag", "axis": "z", "range": [-1, 1]}}
-    with pytest.raises(draft.SpecError, match="neither a segment class nor a mass"):
-        robot([{**tail, "link": {"axis": "-x", "length": 0.2}}]).resolve()
-
-
 @pytest.mark.parametrize("people", ["humanoid", "quadruped"])
 def test_a_link_of_no_class_is_priced_by_its_length_and_says_so(people: str) -> None:
     other = population(people).segments["other"]

@@ -98,18 +98,6 @@ def test_the_command_metrics_knows_the_load(capsys: pytest.CaptureFixture[str]) 
     assert loaded["top_speed"] < bare["top_speed"]
 
 
-def test_many_payloads_are_each_of_them_alone() -> None:
-    loads = np.array([0.0, 2.0, 50.0])
-    many = QUADRUPED.resolve("bear", {"payload": loads})
-    together = of_design(many, KNOWS)
-    for i, mass in enumerate(loads):
-        alone = of_design(QUADRUPED.resolve("bear", {"payload": float(mass)}), KNOWS)
-        again = of_design(many[i], KNOWS)
-        for name in KNOWS:
-            assert np.asarray(together[name])[i] == pytest.approx(alone[name]), name
-            assert again[name] == alone[name]
-
-
 def test_no_payload_leaves_every_metric_as_it_was() -> None:
     bare = of_design(QUADRUPED.resolve("cheetah"))
     empty = of_design(QUADRUPED.resolve("cheetah", {"payload": 0}))
@@ -129,12 +117,6 @@ def test_a_parameter_of_ones_own_keeps_its_name() -> None:
     assert design.parameters["payload"] == 0.7
 
 
-def test_a_negative_payload_is_out_of_range() -> None:
-    with pytest.raises(draft.DraftError, match="payload = -1 kg is outside its range") as caught:
-        QUADRUPED.resolve({"payload": -1})
-    assert caught.value.problems[0].remedy == "stay inside"  # its range stands in no file
-
-
 def test_build_writes_the_load_and_its_design_file_has_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -152,11 +134,6 @@ def test_build_writes_the_load_and_its_design_file_has_it(
     assert found["payload_rated"] == pytest.approx(
         json.loads(capsys.readouterr().out)["metrics"]["payload_rated"]
     )
-
-
-def test_a_payload_twice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["metrics", "cheetah", "--payload", "10", "--set", "payload=5"]) == 2
-    assert "--set gives 'payload' twice" in capsys.readouterr().err
 
 
 def test_a_screen_draws_robots_with_their_load() -> None:

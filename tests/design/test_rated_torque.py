@@ -123,16 +123,8 @@ def test_a_part_whose_rated_torque_is_of_another_version_follows_the_law() -> No
     assert a.origins["rated_torque"].trend == "rated_torque"
 
 
-def test_designs_on_both_sides_of_the_high_reductions_each_follow_their_law() -> None:
-    ratios = np.array([10.0, 49.0, 50.0, 100.0])
-    torques = np.array([50.0, 60.0, 70.0, 80.0])
-    many = size("leg", {"peak_torque": torques, "gear_ratio": ratios}, None)
-    bands = actuator_bands(many)["rated_torque"]
-    for i, (torque, ratio) in enumerate(zip(torques, ratios, strict=True)):
-        one = size("leg", {"peak_torque": float(torque), "gear_ratio": float(ratio)}, None)
-        own = actuator_bands(one)["rated_torque"]
-        assert np.asarray(many.rated_torque)[i] == pytest.approx(one.rated_torque)
-        assert [np.asarray(end)[i] for end in bands] == pytest.approx(list(own))
+def test_designs_on_both_sides_of_the_high_reductions_name_both_laws() -> None:
+    many = size("leg", {"peak_torque": 50.0, "gear_ratio": np.array([10.0, 49, 50, 100])}, None)
     assert many.origins["rated_torque"].trends == RATED
 
 
@@ -141,14 +133,6 @@ def test_a_stated_rated_torque_holds() -> None:
     leg = design.actuators["leg"]
     assert leg.rated_torque == 20
     assert actuator_record(leg)["rated_torque"]["origin"] == "stated"
-
-
-def test_a_stated_rated_torque_above_the_peak_is_refused() -> None:
-    spec = draft.load("quadruped")
-    with pytest.raises(draft.DraftError, match="states a rated torque of 80 N m, above its peak"):
-        spec.resolve({"actuators.leg.rated_torque": 80})
-    many = spec.resolve({"actuators.leg.rated_torque": np.array([20.0, 80.0])})
-    assert list(np.asarray(many.accepted)) == [True, False]
 
 
 def test_the_record_of_a_part_names_the_source_of_its_rated_torque() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,6 @@ import pytest
 
 from draft.errors import DraftError, Problem
 from draft.explore.engines import LocalEngine, RayEngine
-from draft.extras import remedy
 
 
 @dataclass(frozen=True)
@@ -37,12 +35,9 @@ class Doubles:
 
 @pytest.mark.parametrize("workers", [1, 2, 3])
 def test_every_task_is_done_once(tmp_path: Path, workers: int) -> None:
-    found = list(LocalEngine(workers).run(range(20), Doubles(tmp_path)))
-    assert sorted(found) == [(task, 2 * task) for task in range(20)]
-
-
-def test_nothing_to_do_is_done_at_once(tmp_path: Path) -> None:
-    assert list(LocalEngine(2).run([], Doubles(tmp_path))) == []
+    for count in (20, 0):
+        found = list(LocalEngine(workers).run(range(count), Doubles(tmp_path)))
+        assert sorted(found) == [(task, 2 * task) for task in range(count)]
 
 
 def test_a_worker_that_dies_is_replaced_and_its_task_done_again(tmp_path: Path) -> None:
@@ -81,12 +76,3 @@ def test_a_ray_cluster_that_is_not_there_is_said(tmp_path: Path) -> None:
     pytest.importorskip("ray")
     with pytest.raises(DraftError, match="no Ray cluster answers"):
         list(RayEngine("127.0.0.1:1").run([1], Doubles(tmp_path)))
-
-
-def test_a_library_that_is_missing_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(DraftError) as raised:
-        list(RayEngine().run([1], Doubles(tmp_path)))
-    assert str(raised.value) == f"ray is not installed\n  {remedy('cluster')}"

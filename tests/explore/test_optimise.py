@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import dataclasses
 import json
-import sys
+import shlex
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +16,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
-from draft.cli import main
 from draft.explore import goals
 from draft.explore.front import Entry, best
 from draft.explore.search import Search, evaluate, first_designs
 from draft.explore.storage import FILE, STUDY, SqliteLog
-from draft.extras import remedy
+from draft.files import held
 from draft.metrics import of_design
+from tests.commands import Command
 from tests.explore.small import VARY, job, metric
-from tests.written import write_robot
+from tests.written import files_below
 
 SPEC = draft.load("quadruped")
 GOALS = ("--minimise", "leg.mass", "--maximise", "thigh_length")
@@ -75,32 +76,28 @@ def test_a_search_begins_with_designs_that_meet_the_constraints() -> None:
         assert SPEC.resolve(values).accepted
 
 
+Run = Callable[..., dict[str, Any]]
+
+
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a sound robot in it, as the working directory."""
-    monkeypatch.chdir(tmp_path)
-    return write_robot(Path("robot"))
-
-
-def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
-    assert main(["optimise", "robot", *ARGUMENTS, *arguments, "--json"]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
-    return json.loads(out)
+def run(here: Path, command: Command) -> Run:
+    """A search, and the object that it prints."""
+    return lambda line: command.json("optimise robot", *ARGUMENTS, *shlex.split(line))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["nsga2", "tpe"])
 def test_every_design_of_the_front_builds_and_meets_the_constraints(
-    here: Path, capsys: pytest.CaptureFixture[str], sampler: str
+    run: Run, command: Command, sampler: str
 ) -> None:
-    subject_to = ("--subject-to", "accepted and leg.mass < 1.5", "--set", "shank_length=0.22")
-    found = run(capsys, "--trials", "120", "--out", "o", "--sampler", sampler, *subject_to)
+    found = run(
+        f"--trials 120 --out o --sampler {sampler} --set shank_length=0.22 "
+        "--subject-to 'accepted and leg.mass < 1.5'"
+    )
     assert found["trials"] == 120
     front = found["front"]
-    assert [one["goals"]["leg.mass"] for one in front] == sorted(
-        one["goals"]["leg.mass"] for one in front
-    )
+    masses = [one["goals"]["leg.mass"] for one in front]
+    assert masses == sorted(masses)
     with Path("o/front.csv").open(newline="") as file:
         assert [row["design"] for row in csv.DictReader(file)] == [one["design"] for one in front]
     spec = draft.load("robot")
@@ -109,99 +106,91 @@ def test_every_design_of_the_front_builds_and_meets_the_constraints(
         assert design.accepted
         assert design.parameters["shank_length"] == 0.22
         assert design.actuators["leg"].mass == pytest.approx(one["goals"]["leg.mass"])
-    assert main(["build", "robot", "--design", "o/designs/front_001.yaml"]) == 0
+    command("build robot --design o/designs/front_001.yaml")
 
 
 @pytest.mark.slow
-def test_a_search_goes_on_up_to_its_trials(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    first = run(capsys, "--trials", "60", "--out", "o")
-    again = run(capsys, "--trials", "60", "--out", "o")
-    assert again == first
-    more = run(capsys, "--trials", "130", "--out", "o")
+def test_a_search_goes_on_up_to_its_trials(run: Run) -> None:
+    first = run("--trials 60 --out o")
+    assert run("--trials 60 --out o") == first
+    more = run("--trials 130 --out o")
     assert (first["trials"], more["trials"]) == (60, 130)
 
 
-def test_another_search_does_not_go_on_in_a_study(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run(capsys, "--trials", "5", "--out", "o")
-    other = ["--trials", "5", "--out", "o", "--subject-to", "accepted"]
-    assert main(["optimise", "robot", *ARGUMENTS, *other]) == 2
-    assert "'the study' belongs to another run: subject_to differs" in capsys.readouterr().err
-
-
 @pytest.mark.slow
-def test_processes_may_share_a_study(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    url = ("--storage", "sqlite:///shared.db")
-    run(capsys, "--trials", "50", "--out", "a", *url)
-    assert run(capsys, "--trials", "100", "--out", "b", *url)["trials"] == 100
+def test_processes_may_share_a_study(run: Run) -> None:
+    run("--trials 50 --out a --storage sqlite:///shared.db")
+    assert run("--trials 100 --out b --storage sqlite:///shared.db")["trials"] == 100
     assert not Path("b/study.db").exists()
 
 
-def test_goals_may_need_models(
-    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("here")
+def test_goals_may_need_models(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     metric(monkeypatch, "model_weight", "model")
-    arguments = ["--vary", "thigh_length=0.2:0.5", "--minimise", "model_weight", "--trials", "20"]
-    assert main(["optimise", "robot", *arguments, "--out", "o", "--json"]) == 0
-    (one,) = json.loads(capsys.readouterr().out)["front"]
+    words = "--vary thigh_length=0.2:0.5 --minimise model_weight --trials 20 --out o"
+    (one,) = command.json(f"optimise robot {words}")["front"]
     assert one["goals"]["model_weight"] > 0
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("words", "message"),
     [
-        ((), "there is nothing to optimise\n  give --minimise or --maximise"),
-        (("--minimise", "masss"), "--minimise:1:1: unknown name 'masss'"),
-        (("--minimise", "leg.mass", "--maximise", "leg.mass"), "'leg.mass' is given twice"),
-        ((*GOALS, "--subject-to", "leg.mass <"), "--subject-to:1:11: "),
-        ((*GOALS, "--subject-to", "accepted and lg.mass"), "--subject-to:1:14: unknown actuator"),
-        ((*GOALS, "--trials", "0"), "--trials 0 is not a whole number from 1 to 1000000"),
-        ((*GOALS, "--storage", "nowhere://x"), "cannot open the study at 'nowhere://x'"),
-        ((*GOALS, "--out", "robot/tree.yaml"), "cannot write robot/tree.yaml: file exists"),
+        ("", "there is nothing to optimise\n  give --minimise or --maximise"),
+        ("--minimise masss", "--minimise:1:1: unknown name 'masss'"),
+        ("--minimise leg.mass --maximise leg.mass", "'leg.mass' is given twice"),
+        *(
+            (f"{' '.join(GOALS)} {words}", message)
+            for words, message in (
+                ("--subject-to 'leg.mass <'", "--subject-to:1:11: "),
+                ("--subject-to 'accepted and lg.mass'", "--subject-to:1:14: unknown actuator"),
+                ("--trials 0", "--trials 0 is not a whole number from 1 to 1000000"),
+                ("--storage nowhere://x", "cannot open the study at 'nowhere://x'"),
+                ("--out robot/tree.yaml", "cannot write robot/tree.yaml: file exists"),
+            )
+        ),
     ],
 )
-def test_every_mistake_is_said(
-    here: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
+@pytest.mark.usefixtures("here")
+def test_every_mistake_is_said_and_leaves_no_folder(
+    command: Command, words: str, message: str
 ) -> None:
-    given_ = ["--vary", "thigh_length=0.2:0.5", "--out", "o", *arguments]
-    assert main(["optimise", "robot", *given_]) == 2
-    assert message in capsys.readouterr().err
+    before = files_below(Path())
+    line = f"optimise robot --vary thigh_length=0.2:0.5 --out a/b {words}"
+    assert message in command(line, code=2).err
+    assert files_below(Path()) == before
 
 
-def test_a_library_that_is_missing_is_named(
-    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "optuna", None)
-    assert main(["optimise", "robot", *ARGUMENTS, "--out", "o"]) == 2
-    expected = f"error: optuna is not installed\n  {remedy('explore')}\n"
-    assert capsys.readouterr().err == expected
+def test_another_search_or_process_is_kept_out_of_a_study(run: Run, command: Command) -> None:
+    words = "optimise robot --trials 5 --out o"
+    with held(Path("o"), "draft optimise"):
+        err = command(words, *ARGUMENTS, code=2).err
+    assert "another 'draft optimise' is running in 'o'" in err
+    assert not Path("o/study.db").exists()
+    run("--trials 5 --out o")
+    err = command(words, *ARGUMENTS, "--subject-to", "accepted", code=2).err
+    assert "'the study' belongs to another run: subject_to differs" in err
 
 
 @pytest.mark.slow
-def test_designs_of_ones_own_are_kept(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_designs_of_ones_own_are_kept_and_the_front_is_drawn(
+    here: Path, run: Run, command: Command
+) -> None:
+    pytest.importorskip("matplotlib")
     mine = here / "designs" / "front_heavy.yaml"
-    mine.parent.mkdir(exist_ok=True)
     mine.write_text("doc: Mine.\nvalues: {thigh_length: 0.3}\n", encoding="utf-8")
-    run(capsys, "--trials", "60", "--out", str(here))
-    run(capsys, "--trials", "80", "--out", str(here))
+    run(f"--trials 60 --out {here}")
+    run(f"--trials 80 --out {here} --figure")
+    for name in ("front.png", "front.pdf"):
+        assert (here / name).stat().st_size > 5000
     assert mine.is_file()
     names = {path.stem for path in mine.parent.glob("front_0*.yaml")}
     front = json.loads((here / "front.json").read_text(encoding="utf-8"))["front"]
     assert names == {one["design"] for one in front}
     (mine.parent / "front_001.yaml").write_text("doc: Mine.\nvalues: {}\n", encoding="utf-8")
     (here / "front.json").unlink()
-    assert main(["optimise", "robot", *ARGUMENTS, "--trials", "90", "--out", str(here)]) == 2
-    assert "is not a design of this search; it is kept" in capsys.readouterr().err
+    err = command(f"optimise robot --trials 90 --out {here}", *ARGUMENTS, code=2).err
+    assert "is not a design of this search; it is kept" in err
     assert (mine.parent / "front_001.yaml").read_text(encoding="utf-8").startswith("doc: Mine")
-
-
-@pytest.mark.slow
-def test_the_front_is_drawn_and_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("matplotlib")
-    run(capsys, "--trials", "40", "--out", "out", "--figure")
-    for name in ("front.png", "front.pdf"):
-        assert Path("out", name).stat().st_size > 5000
 
 
 @pytest.mark.parametrize(("texts", "panels"), [(["mass"], 1), (["mass", "leg.mass", "pi"], 3)])
@@ -235,55 +224,24 @@ def params(found: Path) -> list[dict[str, float]]:
     return [trial.params for trial in study.trials]
 
 
-@pytest.mark.parametrize("sampler", ["nsga2", "tpe"])
-def test_a_search_that_is_interrupted_repeats_the_one_that_was_not(
-    here: Path, capsys: pytest.CaptureFixture[str], sampler: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    words = ("--sampler", sampler, "--subject-to", "accepted")
-    whole = run(capsys, "--trials", "160", "--out", "whole", *words)
-    # Ended by its number of trials within a generation, and by a fault while one is written.
-    run(capsys, "--trials", "70", "--out", "parts", *words)
-    optuna = pytest.importorskip("optuna")
-    real = optuna.study.Study.add_trials
-
-    def some(study: Any, trials: list[Any]) -> None:
-        if "Journal" in type(study._storage).__name__:
-            real(study, trials[:7])
-            raise KeyboardInterrupt
-        real(study, trials)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(optuna.study.Study, "add_trials", some)
-        end = ["--trials", "160", "--out", "parts", *words]
-        assert main(["optimise", "robot", *ARGUMENTS, *end]) == 130
-        capsys.readouterr()
-    assert len(params(Path("parts"))) == 77
-    again = run(capsys, "--trials", "160", "--out", "parts", *words)
-    assert params(Path("parts")) == params(Path("whole"))
-    assert again["front"] == whole["front"]
-
-
-def test_conditions_that_nothing_meets_are_counted(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["--subject-to", "leg.mass < 0.001", "accepted", "--trials", "12", "--out", "o"]
-    found = run(capsys, *words)
+def test_conditions_that_nothing_meets_are_counted(run: Run, command: Command) -> None:
+    words = "--subject-to 'leg.mass < 0.001' accepted --trials 12 --out o"
+    found = run(words)
     assert found["front"] == []
     assert found["failed"]["leg.mass < 0.001"] == 12
     assert 0 <= found["failed"]["accepted"] <= 12
-    assert main(["optimise", "robot", *ARGUMENTS, *words]) == 0
-    out = capsys.readouterr().out
+    out = command(f"optimise robot {words}", *ARGUMENTS).out
     assert "12 trials, and none meets all conditions:" in out
     assert "leg.mass < 0.001: fails in 12 of 12" in out
 
 
 def test_a_full_disk_is_bad_input_and_the_search_resumes(
-    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    run: Run, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from draft.explore import storage
 
-    run(capsys, "--trials", "20", "--out", "whole")
-    run(capsys, "--trials", "5", "--out", "o")
+    run("--trials 20 --out whole")
+    run("--trials 5 --out o")
 
     class Full(storage._Connection):
         """A database that may not grow, as on a full disk."""
@@ -295,47 +253,22 @@ def test_a_full_disk_is_bad_input_and_the_search_resumes(
 
     with monkeypatch.context() as patch:
         patch.setattr(storage, "_Connection", Full)
-        words = ["--trials", "2000", "--out", "o"]
-        assert main(["optimise", "robot", *ARGUMENTS, *words]) == 2
-    err = capsys.readouterr().err
+        err = command("optimise robot --trials 2000 --out o", *ARGUMENTS, code=2).err
     assert "cannot write the study at 'o/study.db': database or disk is full" in err
     assert "free some space and repeat the command" in err
     kept = len(params(Path("o")))
     assert kept >= 5
-    run(capsys, "--trials", str(max(kept, 20)), "--out", "o")
+    run(f"--trials {max(kept, 20)} --out o")
     assert params(Path("o"))[:20] == params(Path("whole"))
 
 
-def test_two_processes_do_not_search_in_one_folder(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from draft.files import held
-
-    with held(Path("o"), "draft optimise"):
-        assert main(["optimise", "robot", *ARGUMENTS, "--trials", "5", "--out", "o"]) == 2
-    assert "another 'draft optimise' is running in 'o'" in capsys.readouterr().err
-    assert not Path("o/study.db").exists()
-
-
-def test_a_search_that_fails_leaves_no_folder(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["--trials", "5", "--out", "a/b", "--storage", "nonsense://x"]
-    assert main(["optimise", "robot", *ARGUMENTS, *words]) == 2
-    capsys.readouterr()
-    assert [path.name for path in Path().iterdir()] == ["robot"]
-
-
 @pytest.mark.slow
-def test_a_search_loads_its_robots_and_asks_what_more_they_carry(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    ranges = ("--vary", "actuators.leg.peak_torque=10:80", "--minimise", "mass")
-    wanted = ("--payload", "10", "--subject-to", "payload_rated > 10")
-    command = ["optimise", "quadruped:cheetah", *ranges, *wanted, "--trials", "30", "--out", "o"]
-    assert main([*command, "--json"]) == 0
-    (found,) = json.loads(capsys.readouterr().out)["front"]
+@pytest.mark.usefixtures("here")
+def test_a_search_loads_its_robots_and_asks_what_more_they_carry(command: Command) -> None:
+    (found,) = command.json(
+        "optimise quadruped:cheetah --vary actuators.leg.peak_torque=10:80 --minimise mass "
+        "--payload 10 --subject-to 'payload_rated > 10' --trials 30 --out o"
+    )["front"]
     design = SPEC.resolve(Path("o/designs/front_001.yaml"))
     assert design.payload_mass == pytest.approx(10.0)
     assert design.mass == pytest.approx(found["goals"]["mass"])

@@ -91,38 +91,30 @@ def test_ranges_by_name_are_those_of_the_command() -> None:
 @pytest.mark.parametrize(
     "given",
     [
-        3,
-        (1,),
-        (1, 2, 3),
-        (1, 2, "lin"),
-        [],
-        "1:2",
-        [True],
-        [[1], [2]],
-        [[1], [1, 2]],
-        (1, 10**400),
-        {1: 2},
-        ("a", "b"),
-        (0.2, float("nan")),
+        *(3, (1,), (1, 2, 3), (1, 2, "lin"), [], "1:2", [True], [[1], [2]], [[1], [1, 2]]),
+        *((1, 10**400), {1: 2}, ("a", "b"), (0.2, float("nan"))),
     ],
 )
 def test_what_is_neither_a_range_nor_a_list_is_an_error(given: Any) -> None:
-    with pytest.raises(
-        draft.DraftError, match=r"vary\['thigh_length'\] is .*\n  give \(low, high\)"
-    ):
+    words = r"vary\['thigh_length'\] is .*\n  give \(low, high\)"
+    with pytest.raises(draft.DraftError, match=words):
         parse(draft.load("quadruped"), {"thigh_length": given})
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"out": "."}, "'.' is a folder"),
-        ({"workers": 0}, "`workers` 0 is not a whole number from 1 to 1024"),
         ({"vary": {}}, "nothing is varied"),
         ({"vary": {"thigh": (0.2, 0.3)}}, "'thigh' is not a parameter"),
         ({"robot": "quadrupd"}, "did you mean 'quadruped'?"),
-        ({"metrics": "weight"}, "there is no metric 'weight'"),
         ({"n": 0.5}, "`n` 0.5 is not a whole number of at least 1"),
+        ({"n": 1e3}, "`n` 1000 is not a whole number of at least 1"),
+        ({"n": "1e3"}, "`n` '1e3' is not a whole number of at least 1"),
+        ({"vary": 3}, "`vary` is 3, neither ranges by name nor words"),
+        ({"values": 3}, "`values` 3 is not values by name"),
+        ({"sampler": "sobel"}, "did you mean 'sobol'?"),
+        ({"seed": 1 << 63}, "is not a whole number from 0 to 2**63 - 1"),
+        ({"seed": "0"}, "`seed` '0' is not a whole number from 0"),
     ],
 )
 def test_bad_arguments_are_errors_and_nothing_is_written(

@@ -6,9 +6,11 @@ import dataclasses
 import errno
 import json
 import os
+import shlex
 import shutil
 import signal
-import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +28,27 @@ from draft.explore.job import opened
 from draft.explore.parquet_parts import Parts, about
 from draft.explore.rows import verdict
 from draft.explore.screen import CHUNK, run_screen
-from draft.extras import remedy
 from draft.laws import actuators
 from draft.spec.load import ROBOTS
+from tests.commands import Command
 from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, paused, pq, rows
-from tests.written import write_robot
 
 SPEC = draft.load("quadruped")
+GRID = ("thigh_length=0.2:0.5", "shank_length=0.2:0.5")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Screens that were never stopped; each is computed once."""
+    folder = tmp_path_factory.mktemp("screens")
+
+    @cache
+    def screened(**changes: Any) -> Path:
+        out = folder / f"{len(list(folder.iterdir()))}.parquet"
+        run_screen(job(SPEC, **changes), out, HERE)
+        return out
+
+    return screened
 
 
 def test_the_rows_are_those_of_one_resolve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -52,35 +68,30 @@ def test_the_rows_are_those_of_one_resolve(tmp_path: Path, monkeypatch: pytest.M
         assert accepted.as_py() == (refused_by.as_py() is None)
 
 
-def test_rows_that_fail_the_condition_are_dropped_and_counted(tmp_path: Path) -> None:
-    out = tmp_path / "s.parquet"
-    summary = run_screen(job(SPEC, where="accepted and leg.mass < 2"), out, HERE)
-    assert summary["rows"] + summary["dropped"] == summary["designs"] == 1000
-    assert 0 < summary["rows"] == len(rows(out)) == summary["accepted"]
-    none = run_screen(job(SPEC, where="leg.mass < 0"), tmp_path / "none.parquet", HERE)
-    assert (none["rows"], rows(tmp_path / "none.parquet")) == (0, [])
-
-
-@pytest.mark.parametrize("share", [0.9, 0.5, 0.05])
+@pytest.mark.parametrize("share", [0.9, 0.5, 0.05, 0.0])
 def test_rows_that_are_kept_are_those_of_a_screen_that_keeps_all(
-    tmp_path: Path, share: float
+    tmp_path: Path, share: float, finished: Callable[..., Path]
 ) -> None:
     """Whether few or many are kept, which are measured in two ways."""
-    run_screen(job(SPEC, metrics=None, vary=VARY), tmp_path / "all.parquet", HERE)
-    everything = pq.read_table(tmp_path / "all.parquet")
+    everything = pq.read_table(finished(metrics=None))
     limit = float(np.quantile(everything["mass"], share))
-    some = job(SPEC, metrics=None, vary=VARY, where=f"mass < {limit!r}")
-    run_screen(some, tmp_path / "some.parquet", HERE)
+    some = job(SPEC, metrics=None, where=f"mass < {limit!r}")
+    summary = run_screen(some, tmp_path / "some.parquet", HERE)
     found = pq.read_table(tmp_path / "some.parquet")
     kept = everything.filter(everything["mass"].to_numpy() < limit)
-    assert 0 < found.num_rows == kept.num_rows < everything.num_rows
+    assert found.num_rows == kept.num_rows == summary["rows"] < everything.num_rows
+    assert bool(found.num_rows) == bool(share)
+    assert summary["rows"] + summary["dropped"] == summary["designs"] == 1000
+    assert summary["accepted"] == np.count_nonzero(found["accepted"])
     for name in everything.column_names:
         np.testing.assert_array_equal(found[name], kept[name], name)
 
 
-def test_the_file_says_what_it_is(tmp_path: Path) -> None:
+def test_the_file_says_what_it_is_and_is_not_computed_again(tmp_path: Path) -> None:
     out = tmp_path / "s.parquet"
     summary = run_screen(job(SPEC, where="accepted"), out, HERE)
+    again = run_screen(job(SPEC, where="accepted"), out, Stops(0))
+    assert (again["computed"], again["rows"]) == (0, summary["rows"])
     meta = about(out)
     assert meta["manifest"]["vary"]["thigh_length"] == "0.2:0.5"
     assert meta["manifest"]["where"] == "accepted"
@@ -92,32 +103,24 @@ def test_the_file_says_what_it_is(tmp_path: Path) -> None:
 @pytest.mark.slow
 @given(after=st.integers(0, 9))
 def test_a_run_that_goes_on_gives_the_rows_of_one_never_stopped(
-    tmp_path_factory: pytest.TempPathFactory, after: int
+    tmp_path_factory: pytest.TempPathFactory, after: int, finished: Callable[..., Path]
 ) -> None:
     folder = tmp_path_factory.mktemp("run")
     one = job(SPEC, where="accepted")
-    run_screen(one, folder / "whole.parquet", HERE)
     with pytest.raises(StopError):
         run_screen(one, folder / "s.parquet", Stops(after))
     assert not (folder / "s.parquet").exists()
     summary = run_screen(one, folder / "s.parquet", HERE)
     assert summary["computed"] == 1000 - 100 * after
-    assert (folder / "s.parquet").read_bytes() == (folder / "whole.parquet").read_bytes()
+    assert (folder / "s.parquet").read_bytes() == finished(where="accepted").read_bytes()
 
 
 @pytest.mark.slow
-def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
-    one = job(SPEC)
-    run_screen(one, tmp_path / "one.parquet", HERE)
-    run_screen(one, tmp_path / "two.parquet", LocalEngine(2))
-    assert (tmp_path / "one.parquet").read_bytes() == (tmp_path / "two.parquet").read_bytes()
-
-
-def test_a_complete_file_is_not_computed_again(tmp_path: Path) -> None:
-    first = run_screen(job(SPEC), tmp_path / "s.parquet", HERE)
-    again = run_screen(job(SPEC), tmp_path / "s.parquet", Stops(0))
-    assert again["computed"] == 0
-    assert again["rows"] == first["rows"]
+def test_processes_give_the_rows_of_one_process(
+    tmp_path: Path, finished: Callable[..., Path]
+) -> None:
+    run_screen(job(SPEC), tmp_path / "two.parquet", LocalEngine(2))
+    assert (tmp_path / "two.parquet").read_bytes() == finished().read_bytes()
 
 
 def test_a_job_holds_the_files_of_its_spec(tmp_path: Path) -> None:
@@ -162,13 +165,17 @@ def test_a_spec_whose_files_are_gone_makes_no_job(tmp_path: Path) -> None:
         ({"spec": "cat"}, "spec differs"),
     ],
 )
-@pytest.mark.parametrize("finished", [True, False])
+@pytest.mark.parametrize("complete", [True, False])
 def test_another_run_is_refused_and_not_mixed(
-    tmp_path: Path, change: dict[str, Any], message: str, finished: bool
+    tmp_path: Path,
+    change: dict[str, Any],
+    message: str,
+    complete: bool,
+    finished: Callable[..., Path],
 ) -> None:
     out = tmp_path / "s.parquet"
-    if finished:
-        run_screen(job(SPEC), out, HERE)
+    if complete:
+        shutil.copy(finished(), out)
     else:
         with pytest.raises(StopError):
             run_screen(job(SPEC), out, Stops(3))
@@ -205,7 +212,7 @@ def test_two_processes_do_not_write_to_one_place(tmp_path: Path) -> None:
     one = job(SPEC)
     with (
         Parts(tmp_path / "s.parquet.parts", one.manifest(), one.parts).held(),
-        pytest.raises(draft.DraftError, match="another 'draft screen' is running in"),
+        pytest.raises(draft.DraftError, match="another screen is running in"),
     ):
         run_screen(one, tmp_path / "s.parquet", HERE)
 
@@ -247,93 +254,47 @@ def test_a_killed_process_leaves_whole_parts_and_no_workers(tmp_path: Path) -> N
     assert out.read_bytes() == (tmp_path / "whole.parquet").read_bytes()
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a sound robot in it, as the working directory."""
-    monkeypatch.chdir(tmp_path)
-    return write_robot(Path("robot"))
-
-
-def test_the_command_prints_one_object(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    vary = ("--vary", "thigh_length=0.2:0.5", "--n", "1e3")
-    assert main(["screen", "robot", *vary, "--out", "s.parquet", "--workers", "1", "--json"]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
-    found = json.loads(out)
+@pytest.mark.usefixtures("here")
+def test_the_command_prints_one_object_or_says_what_a_grid_became(command: Command) -> None:
+    words = "screen robot --vary thigh_length=0.2:0.5 --n 1e3"
+    found = command.json(f"{words} --out s.parquet --workers 1")
     assert (found["out"], found["designs"], found["rows"]) == ("s.parquet", 1000, 1000)
-
-
-def test_a_grid_says_what_n_became(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    vary = ("--vary", "thigh_length=0.2:0.5", "shank_length=0.2:0.5", "--sampler", "grid")
-    assert main(["screen", "robot", *vary, "--n", "1000", "--out", "s.parquet"]) == 0
-    out, err = capsys.readouterr()
-    assert err == "a grid of 961 designs (asked for 1,000)\n"
-    assert "961 designs, 961 kept" in out
-
-
-def test_a_named_design_and_values_hold_for_all(here: Path) -> None:
-    arguments = ["--design", "long", "--set", "shank_length=0.2", "--workers", "1", "--n", "4"]
-    vary = [
-        "--vary",
-        "trunk_length=0.3:0.5",
-        "--where",
-        "thigh_length == 0.45 and shank_length == 0.2",
-    ]
-    assert main(["screen", "robot", *arguments, *vary, "--out", "s.parquet"]) == 0
-    assert len(rows(Path("s.parquet"))) == 4
-
-
-@pytest.mark.parametrize("text", ["1.5", "many", "inf", "nan"])
-def test_a_number_of_designs_is_a_whole_number(
-    text: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["screen", "bear", "--vary", "thigh_length=0.2:0.3", "--out", "s", "--n", text])
-    assert ended.value.code == 2
-    assert f"--n: expected a whole number, not '{text}'" in capsys.readouterr().err
+    said = command("screen robot --n 1000 --sampler grid --out g.parquet", "--vary", *GRID)
+    assert said.err == "a grid of 961 designs (asked for 1,000)\n"
+    assert "961 designs, 961 kept" in said.out
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("words", "message"),
     [
-        (("--n", "0"), "--n 0 is not a whole number of at least 1"),
-        (("--n", "1e12"), "1e+12 designs take up to "),
-        (("--n", "1e12", "--where", "accepted"), "and a run has at most 1e+10"),
-        (("--seed", "-1"), "--seed -1 is not a whole number from 0 to 2**63 - 1"),
-        (("--workers", "0"), "--workers 0 is not a whole number from 1 to 1024"),
-        (("--metrics", "masss_"), "there is no metric 'masss_'"),
-        (("--out", "robot"), "--out 'robot' is a folder"),
-        (("--out", "robot/tree.yaml"), "was not written by 'draft screen'; it is kept"),
-        (("--set", "thigh_length=0.3"), "is given by --set and by --vary"),
-        (("--set", "shank_length=9"), "shank_length = 9 m is outside its range [0.1, 0.6]"),
-        (("--design", "lang"), "did you mean 'long'?"),
-        (("--vary", "thigh_lenght=1:2"), "did you mean 'thigh_length'?"),
-        (("--where", "acepted"), "--where:1:1: unknown name 'acepted'"),
+        ("screen --n 0", "--n 0 is not a whole number of at least 1"),
+        ("screen --n 1e12", "1e+12 designs take up to "),
+        ("screen --n 1e12 --where accepted", "and a run has at most 1e+10"),
+        ("screen --seed -1", "--seed -1 is not a whole number from 0 to 2**63 - 1"),
+        ("screen --workers 0", "--workers 0 is not a whole number from 1 to 1024"),
+        ("screen --metrics masss_", "there is no metric 'masss_'"),
+        ("screen --out robot", "--out 'robot' is a folder"),
+        ("screen --out robot/tree.yaml", "was not written by 'draft screen'; it is kept"),
+        ("screen --set thigh_length=0.3", "is given by --set and by --vary"),
+        ("screen --set shank_length=9", "shank_length = 9 m is outside its range [0.1, 0.6]"),
+        ("screen --design lang", "did you mean 'long'?"),
+        ("screen --vary thigh_lenght=1:2", "did you mean 'thigh_length'?"),
+        ("screen --where acepted", "--where:1:1: unknown name 'acepted'"),
+        ("sweep --address a:1", "--address is for a Ray cluster"),
+        ("sweep --out ''", "--out names no folder"),
+        ("sweep --out robot", "'robot' is not a folder of a Draft run; it is kept"),
+        ("sweep --out robot/tree.yaml", "exists and is not a folder"),
     ],
 )
+@pytest.mark.usefixtures("here")
 def test_every_mistake_is_said_and_nothing_is_written(
-    here: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
+    words: str, message: str, command: Command
 ) -> None:
     before = sorted(Path().rglob("*"))
-    given_ = ["--vary", "thigh_length=0.2:0.5", "--out", "s.parquet", *arguments]
-    assert main(["screen", "robot", *given_]) == 2
-    assert message in capsys.readouterr().err
+    word, *more = shlex.split(words)
+    given_ = f"{word} robot --vary thigh_length=0.2:0.5 --out s.parquet"
+    assert message in command.refuses(given_, *more)
     assert sorted(Path().rglob("*")) == before
-
-
-@pytest.mark.parametrize("library", ["scipy", "pyarrow"])
-def test_a_library_that_is_missing_is_named(
-    here: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    library: str,
-) -> None:
-    for name in (library, "scipy.stats.qmc", "pyarrow.parquet"):
-        if name.startswith(library):
-            monkeypatch.setitem(sys.modules, name, None)
-    assert main(["screen", "robot", "--vary", "thigh_length=0.2:0.5", "--out", "s.parquet"]) == 2
-    expected = f"error: {library} is not installed\n  {remedy('explore')}\n"
-    assert capsys.readouterr().err == expected
 
 
 def test_every_kind_of_finding_has_its_bit(tmp_path: Path) -> None:

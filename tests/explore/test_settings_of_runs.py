@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from typing import Annotated, Any
+from typing import Annotated
 
 import pytest
 from pydantic import Field
@@ -73,22 +73,3 @@ def test_python_and_the_command_have_the_fields_of_the_settings(name: str) -> No
     shown = {option.removeprefix("--").replace("-", "_") for option in arguments(main)}
     own = {"", "design", "set", "payload", "json"}
     assert shown == (fields - {"values", "progress"}) | own
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"n": 1e3}, "`n` 1000 is not a whole number of at least 1"),
-        ({"n": "1e3"}, "`n` '1e3' is not a whole number of at least 1"),
-        ({"vary": 3}, "`vary` is 3, neither ranges by name nor words"),
-        ({"values": 3}, "`values` 3 is not values by name"),
-        ({"sampler": "sobel"}, "did you mean 'sobol'?"),
-        ({"seed": 1 << 63}, "is not a whole number from 0 to 2**63 - 1"),
-        ({"seed": "0"}, "`seed` '0' is not a whole number from 0"),
-    ],
-)
-def test_an_invalid_setting_is_refused(changes: dict[str, Any], message: str) -> None:
-    given: dict[str, Any] = {"vary": {"thigh_length": (0.2, 0.3)}, "out": "s.parquet", **changes}
-    with pytest.raises(draft.DraftError) as raised:
-        draft.screen("bear", **given)
-    assert message in str(raised.value)

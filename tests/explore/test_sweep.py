@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import signal
 from pathlib import Path
@@ -13,14 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import draft
-from draft.cli import main
 from draft.design import Design
 from draft.explore.engines import LocalEngine
 from draft.explore.sweep import chunk, run_sweep
 from draft.metrics import METRICS, of_model
 from draft.model import batch
+from tests.commands import Command
 from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, paused, rows
-from tests.written import write_robot
 
 SPEC = draft.load("quadruped")
 
@@ -98,7 +96,7 @@ def test_a_model_that_mujoco_rejects_is_a_row_that_says_so(
         assert math.isnan(row["model_weight"])
 
 
-def test_a_condition_may_read_what_only_models_have(
+def test_a_condition_may_read_what_only_models_have_and_spares_them_where_it_does_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     metric(monkeypatch, "model_weight", "model")
@@ -107,28 +105,30 @@ def test_a_condition_may_read_what_only_models_have(
     found = rows(tmp_path / "s")
     assert 0 < len(found) == summary["rows"] < 60
     assert all(row["accepted"] and row["model_weight"] < 300 for row in found)
-
-
-def test_what_is_dropped_by_closed_form_is_not_built(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setattr(draft.Design, "build", lambda self: pytest.fail("built"))
-    summary = run_sweep(job(SPEC, 60, "sweep", where="leg.mass < 0"), tmp_path / "s", HERE)
+    summary = run_sweep(job(SPEC, 60, "sweep", where="leg.mass < 0"), tmp_path / "none", HERE)
     assert (summary["rows"], summary["dropped"]) == (0, 60)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep that was never stopped."""
+    out = tmp_path_factory.mktemp("whole") / "s"
+    run_sweep(job(SPEC, 60, "sweep", chunk=10), out, HERE)
+    return out
 
 
 @settings(max_examples=5)
 @given(after=st.integers(0, 5))
 def test_a_sweep_that_goes_on_gives_the_rows_of_one_never_stopped(
-    tmp_path_factory: pytest.TempPathFactory, after: int
+    tmp_path_factory: pytest.TempPathFactory, after: int, whole: Path
 ) -> None:
     folder = tmp_path_factory.mktemp("run")
     one = job(SPEC, 60, "sweep", chunk=10)
-    run_sweep(one, folder / "whole", HERE)
     with pytest.raises(StopError):
         run_sweep(one, folder / "s", Stops(after))
     assert run_sweep(one, folder / "s", HERE)["computed"] == 60 - 10 * after
-    assert rows(folder / "s") == rows(folder / "whole")
+    assert rows(folder / "s") == rows(whole)
 
 
 @pytest.mark.slow
@@ -156,52 +156,10 @@ def test_a_sweep_that_is_ended_goes_on(tmp_path: Path, with_: signal.Signals) ->
     assert len(list(out.glob("part-*"))) == 2 + 3
 
 
-def test_the_command_prints_one_object(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    write_robot(Path("robot"))
-    arguments = ["--vary", "thigh_length=0.2:0.5", "--n", "10", "--workers", "1", "--out", "s"]
-    assert main(["sweep", "robot", *arguments, "--json"]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
-    assert json.loads(out)["designs"] == 10
-
-
-def test_a_sweep_weighs_its_robots_with_their_load(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    one = ["sweep", "quadruped:cheetah", "--vary", "thigh_length=0.2:0.3", "--n", "4"]
-    for out, load in (("bare", []), ("loaded", ["--payload", "10"])):
-        assert main([*one, *load, "--workers", "1", "--metrics", "mass", "--out", out]) == 0
+@pytest.mark.usefixtures("here")
+def test_the_command_prints_one_object_and_weighs_robots_with_their_load(command: Command) -> None:
+    words = "sweep quadruped:cheetah --vary thigh_length=0.2:0.3 --n 4 --workers 1 --metrics mass"
+    assert command.json(f"{words} --out bare")["designs"] == 4
+    command(f"{words} --out loaded --payload 10")
     pairs = zip(rows(Path("bare")), rows(Path("loaded")), strict=True)
     assert [b["mass"] - a["mass"] for a, b in pairs] == pytest.approx([10.0] * 4)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--n", "0"), "--n 0 is not a whole number of at least 1"),
-        (("--n", "1e12"), "1e+12 designs take up to "),
-        (("--address", "a:1"), "--address is for a Ray cluster"),
-        (("--out", ""), "--out names no folder"),
-        (("--out", "robot"), "'robot' is not a folder of a Draft run; it is kept"),
-        (("--out", "robot/tree.yaml"), "exists and is not a folder"),
-        (("--metrics", "masss_"), "there is no metric 'masss_'"),
-    ],
-)
-def test_every_mistake_is_said_and_nothing_is_written(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    arguments: tuple[str, ...],
-    message: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    write_robot(Path("robot"))
-    before = sorted(Path().rglob("*"))
-    given_: list[Any] = ["--vary", "thigh_length=0.2:0.5", "--out", "s", *arguments]
-    assert main(["sweep", "robot", *given_]) == 2
-    assert message in capsys.readouterr().err
-    assert sorted(Path().rglob("*")) == before

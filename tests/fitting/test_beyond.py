@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,30 +10,11 @@ import pytest
 from draft.design.actuators import size
 from draft.design.bands import actuator_bands
 from draft.fitting import beyond as fitting
-from draft.fitting.limits import DATA, table
+from draft.fitting.limits import table
 from draft.laws.actuators import laws
-from draft.laws.beyond import FILE, beyond
-from tests.fitting.test_limits import SHARED
+from draft.laws.beyond import beyond
 
 DOCS = Path(__file__).parents[2] / "docs" / "twins.md"
-
-
-def test_the_shipped_errors_are_what_the_shipped_tables_give() -> None:
-    shipped, fresh = json.loads(FILE.read_text(encoding="utf-8")), fitting.records()
-    assert shipped.keys() == fresh.keys()
-    for name, law in fresh.items():
-        for a, b in zip(shipped[name]["terms"], law["terms"], strict=True):
-            assert a["factor"] == pytest.approx(b["factor"], rel=1e-6), name
-            assert a["exponents"] == pytest.approx(b["exponents"], rel=1e-6), name
-        assert shipped[name]["n"] == law["n"]
-        assert shipped[name].get("sigma_log") == pytest.approx(law.get("sigma_log"))
-
-
-def test_the_table_of_small_actuators_is_the_gathered_one() -> None:
-    gathered = SHARED / f"{fitting.SMALL}.csv"
-    if not gathered.exists():
-        pytest.skip("the gathered tables are not at hand")
-    assert (DATA / gathered.name).read_bytes() == gathered.read_bytes()
 
 
 def test_the_band_of_a_small_actuator_holds_nine_in_ten_of_the_gathered_ones() -> None:

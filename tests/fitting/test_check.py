@@ -21,36 +21,36 @@ def _n(part: Part) -> float:
     return part.gear_ratio or math.nan
 
 
-# slip -> modules, what it does to one, words that name it, least share of modules where it is found
-SLIPS: dict[str, tuple[list[Part], Callable[[Part], Part], str, float]] = {
-    "grams": (ALL, lambda p: replace(p, mass=p.mass * 1e3), "grams", 1.0),
-    "rpm": (GEARED, lambda p: replace(p, no_load_speed=p.no_load_speed / RPM), "rpm", 1.0),
+def _rotor(part: Part) -> float:
+    return part.rotor_inertia or math.nan
+
+
+Slip = tuple[list[Part], Callable[[Part], dict[str, float]], str, float]
+# Modules, what a slip changes of one, words that name it, least share of modules where it is found.
+SLIPS: dict[str, Slip] = {
+    "grams": (ALL, lambda p: {"mass": p.mass * 1e3}, "grams", 1.0),
+    "rpm": (GEARED, lambda p: {"no_load_speed": p.no_load_speed / RPM}, "rpm", 1.0),
     "motor side": (
         GEARED,
-        lambda p: replace(p, no_load_speed=p.no_load_speed * _n(p)),
+        lambda p: {"no_load_speed": p.no_load_speed * _n(p)},
         "the motor's speed",
         0.95,
     ),
     "motor side in rpm": (
         GEARED,
-        lambda p: replace(p, no_load_speed=p.no_load_speed * _n(p) / RPM),
+        lambda p: {"no_load_speed": p.no_load_speed * _n(p) / RPM},
         "the motor's speed in rpm",
         1.0,
     ),
     "output side": (
         ROTORS,
-        lambda p: replace(p, rotor_inertia=(p.rotor_inertia or math.nan) * _n(p) ** 2),
+        lambda p: {"rotor_inertia": _rotor(p) * _n(p) ** 2},
         "the inertia at the output",
         1.0,
     ),
-    "g cm2": (
-        ROTORS,
-        lambda p: replace(p, rotor_inertia=(p.rotor_inertia or math.nan) * 1e7),
-        "g cm2",
-        1.0,
-    ),
-    "radius": (GEARED, lambda p: replace(p, radius=p.radius / 2), "a radius", 0.8),
-    "centimetres": (GEARED, lambda p: replace(p, length=p.length / 10), "centimetres", 1.0),
+    "g cm2": (ROTORS, lambda p: {"rotor_inertia": _rotor(p) * 1e7}, "g cm2", 1.0),
+    "radius": (GEARED, lambda p: {"radius": p.radius / 2}, "a radius", 0.8),
+    "centimetres": (GEARED, lambda p: {"length": p.length / 10}, "centimetres", 1.0),
 }
 
 
@@ -66,7 +66,7 @@ def test_a_slip_of_units_is_found_and_named(slip: str) -> None:
     modules, spoil, words, share = SLIPS[slip]
     found = 0
     for part in modules:
-        doubts = check([spoil(part)])
+        doubts = check([replace(part, **spoil(part))])
         found += any(d.kind == "unit_slip" and words in d.remedy for d in doubts)
     assert found >= share * len(modules)
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from draft.cli import main
 from draft.extras import remedy
+from tests.commands import printed, refusal
 from tests.description import written
 
 
@@ -29,34 +29,25 @@ def test_a_description_is_copied_under_its_key(
     source = tmp_path / "robot.urdf"
     source.write_text(written.leg())
     _package(monkeypatch, URDF_PATH=str(source))
-    assert main(["survey", "fetch", "h1", "--out", str(tmp_path / "out")]) == 0
+    printed("survey", "fetch", "h1", "--out", tmp_path / "out", progress=True)
     assert (tmp_path / "out" / "h1.urdf").read_text() == written.leg()
 
 
 def test_without_the_package_the_message_says_how_to_get_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "robot_descriptions", None)
-    assert main(["survey", "fetch", "h1", "--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == (
-        "error: the package robot_descriptions is not installed\n"
+    assert refusal("survey", "fetch", "h1") == (
+        "the package robot_descriptions is not installed\n"
         f"  {remedy('survey')}; the shipped table needs no download\n"
     )
 
 
-def test_what_goes_wrong_inside_the_package_is_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_fetched_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "did you mean 'h1'?" in refusal("survey", "fetch", "h11")
     _package(monkeypatch)
-    assert main(["survey", "fetch", "h1", "--out", str(tmp_path / "out")]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("error: cannot fetch 'h1': No module named")
+    error = refusal("survey", "fetch", "h1")
+    assert error.startswith("cannot fetch 'h1': No module named")
     assert "check the network" in error
-
-
-def test_a_robot_without_a_plain_file_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
     _package(monkeypatch, XACRO_PATH="robot.xacro")
-    assert main(["survey", "fetch", "h1", "--out", str(tmp_path / "out")]) == 2
-    assert "no plain URDF or MJCF file of 'h1'" in capsys.readouterr().err
+    assert "no plain URDF or MJCF file of 'h1'" in refusal("survey", "fetch", "h1")

@@ -12,21 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from draft.cli import main
-from draft.fitting.structure import (
-    attribution,
-    calibrated,
-    fits,
-    whole,
-)
-from draft.fitting.structure import (
-    survey_holdout as holdout,
-)
-from draft.fitting.structure import (
-    survey_refit as refit,
-)
+from draft.fitting.structure import attribution, calibrated, fits, whole
+from draft.fitting.structure import survey_holdout as holdout
+from draft.fitting.structure import survey_refit as refit
 from draft.fitting.structure.attribution import Machine, machines, price
-from draft.fitting.structure.parse import parse
+from draft.fitting.structure.parse import Survey, parse
 from draft.fitting.structure.robots import hosts, robots
 from draft.fitting.structure.survey_published import figures
 from draft.laws import joint_roles as roles
@@ -35,6 +25,7 @@ from draft.laws import survey as rows
 from draft.laws.actuators import laws
 from draft.laws.structure import FILE
 from draft.laws.survey import usable
+from tests.commands import line, printed
 
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
 MANIFEST = SHARED / "robots" / "manifest.csv"
@@ -60,41 +51,27 @@ def _of(population: str, surveyed: list[Machine]) -> list[Machine]:
     return [robot for robot in surveyed if robot.population == population]
 
 
-def test_the_shipped_trends_are_what_the_shipped_table_gives() -> None:
-    fitted = refit.structure_trends()
-    shipped = json.loads(FILE.read_text(encoding="utf-8"))
-
-    def flat(value: object, path: str = "") -> dict[str, object]:
-        if isinstance(value, dict):
-            return {k: v for key, x in value.items() for k, v in flat(x, f"{path}.{key}").items()}
-        if isinstance(value, list):
-            return {k: v for i, x in enumerate(value) for k, v in flat(x, f"{path}.{i}").items()}
-        return {path: value}
-
-    ours, theirs = flat(fitted), flat(shipped)
-    assert ours.keys() == theirs.keys()
-    for path, value in theirs.items():
-        wanted = pytest.approx(value, rel=1e-7) if isinstance(value, float) else value
-        assert ours[path] == wanted, path
+@pytest.fixture(scope="module")
+def parsed() -> Survey:
+    """The survey's descriptions, read."""
+    if not MANIFEST.exists():
+        pytest.skip("the descriptions are not here")
+    return parse(MANIFEST)
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not MANIFEST.exists(), reason="the descriptions are not here")
-def test_the_shipped_table_is_what_the_parser_gives() -> None:
-    survey = parse(MANIFEST)
-    assert survey.failed == []
-    assert rows.write(survey.rows) == rows.FILE.read_text(encoding="utf-8")
-    assert [str(note) for one in survey.used for note in one.notes] == []
+def test_the_shipped_table_is_what_the_parser_gives(parsed: Survey) -> None:
+    assert parsed.failed == []
+    assert rows.write(parsed.rows) == rows.FILE.read_text(encoding="utf-8")
+    assert [str(note) for one in parsed.used for note in one.notes] == []
 
 
-@pytest.mark.skipif(not MANIFEST.exists(), reason="the descriptions are not here")
-def test_every_robot_left_out_can_be_read_and_has_its_reason() -> None:
-    survey = parse(MANIFEST)
-    left = [one for one in survey.parsed if not one.robot.used]
-    assert len(survey.parsed) == 75
+def test_every_robot_left_out_can_be_read_and_has_its_reason(parsed: Survey) -> None:
+    left = [one for one in parsed.parsed if not one.robot.used]
+    assert len(parsed.parsed) == 75
     assert [one.robot.key for one in left if not one.robot.reason] == []
     listed = {key: (robot.used, robot.reason) for key, robot in robots().items()}
-    for one in survey.parsed:
+    for one in parsed.parsed:
         if not one.robot.key.startswith("twin_"):
             assert listed[one.robot.key] == (one.robot.used, one.robot.reason)
 
@@ -129,18 +106,16 @@ def test_36_figures_of_the_table_and_the_allometry_are_labelled_as_released_data
     assert law.source == "released data of arXiv 2609.38405, structure trends"
 
 
-def test_the_table_shows_the_source_of_each_figure(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["survey", "table"]) == 0
-    out = capsys.readouterr().out
+def test_the_command_shows_printed_and_reproduced_figures_and_their_sources() -> None:
+    out = printed("survey", "table")
     assert "source" in out.splitlines()[0]
-    row = next(line for line in out.splitlines() if " low " in line)
+    row = next(one for one in out.splitlines() if " low " in one)
     assert "released data" in row
-    assert (
-        "95 of 103 published figures reproduce; 36 of them are from the released data"
-        in " ".join(out.split())
-    )
-    assert main(["survey", "table", "--json"]) == 0
-    assert [f["source"] for f in json.loads(capsys.readouterr().out)][:2] == ["paper", "paper"]
+    words = "95 of 103 published figures reproduce; 36 of them are from the released data"
+    assert words in line(out)
+    record = json.loads(printed("survey", "table", "--json"))
+    assert [one["source"] for one in record][:2] == ["paper", "paper"]
+    assert "1.105" in printed("survey", "fit")
 
 
 def test_the_mass_of_actuators_with_all_digits_would_change_three_figures(
@@ -160,22 +135,24 @@ def test_the_mass_of_actuators_with_all_digits_would_change_three_figures(
     }
 
 
-def test_held_out_robots_are_predicted_within_the_published_error() -> None:
-    table = json.loads(FILE.read_text(encoding="utf-8"))
-    humanoid, quadruped = table["humanoid"]["held_out"], table["quadruped"]["held_out"]
-    assert (humanoid["n"], quadruped["n"]) == (29, 20)
-    assert (round(humanoid["paper"], 2), round(quadruped["paper"], 2)) == (1.20, 1.18)
-    assert (round(humanoid["draft"], 3), round(quadruped["draft"], 3)) == (1.105, 1.143)
-    assert (round(humanoid["median_alone"], 2), round(quadruped["median_alone"], 2)) == (1.42, 1.77)
+# n, errors by the published sum, by the leg length, by the median robot, and the bar of the
+# calibrated total.
+SCORES = {
+    "humanoid": (29, "1.20", "1.105", "1.42", 1.13),
+    "quadruped": (20, "1.18", "1.143", "1.77", 1.16),
+}
 
 
-def test_the_calibrated_total_meets_its_bars_on_robots_held_out() -> None:
-    table = json.loads(FILE.read_text(encoding="utf-8"))
-    for name, bar in (("humanoid", 1.13), ("quadruped", 1.16)):
-        scores = table[name]["held_out"]
-        assert scores["calibrated"] <= bar
-        assert scores["calibrated"] < scores["paper"]
-        assert scores["calibrated_maker_out"] < scores["paper_maker_out"]
+@pytest.mark.parametrize("name", SCORES)
+def test_held_out_robots_are_predicted_within_the_published_error(name: str) -> None:
+    n, paper, by_legs, median, bar = SCORES[name]
+    scores = json.loads(FILE.read_text(encoding="utf-8"))[name]["held_out"]
+    assert scores["n"] == n
+    found = (f"{scores['paper']:.2f}", f"{scores['draft']:.3f}", f"{scores['median_alone']:.2f}")
+    assert found == (paper, by_legs, median)
+    assert scores["calibrated"] <= bar
+    assert scores["calibrated"] < scores["paper"]
+    assert scores["calibrated_maker_out"] < scores["paper_maker_out"]
 
 
 @pytest.mark.parametrize(
@@ -312,39 +289,19 @@ def test_no_fitted_class_loses_mass_with_length(surveyed: list[Machine]) -> None
 def test_the_whole_robot_law_finds_the_law_behind_its_robots(
     coefficient: float, exponent: float
 ) -> None:
-    made = []
+    made: list[Machine] = []
     for key, leg in enumerate(np.linspace(0.3, 0.9, 6)):
-        half = rows.Row(
-            str(key), "humanoid", "t", "", "thigh", (), (), (), (), 0.0, leg / 2, (0, 0, 0), (), ()
-        )
-        made.append(half)
-    robots_ = [
-        Machine(
-            row.robot,
-            "humanoid",
-            (fits.Piece(row, 0.0, 0.0),),
-            coefficient * row.length**exponent + 5.0,
-            5.0,
-        )
-        for row in made
-    ]
-    law = whole.fit(robots_)
+        own = (str(key), "humanoid", "t", "", "thigh", (), (), (), (), 0.0, leg / 2)
+        piece = fits.Piece(rows.Row(*own, (0, 0, 0), (), ()), 0.0, 0.0)
+        mass = coefficient * piece.row.length**exponent + 5.0
+        made.append(Machine(str(key), "humanoid", (piece,), mass, 5.0))
+    law = whole.fit(made)
     assert (law.coefficient, law.exponent) == pytest.approx((coefficient, exponent), rel=1e-6)
 
 
 def test_the_table_of_rows_survives_writing_and_reading() -> None:
     text = rows.FILE.read_text(encoding="utf-8")
     assert rows.write(rows.read()) == text
-
-
-def test_the_command_shows_printed_and_reproduced_figures(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert main(["survey", "table"]) == 0
-    out = capsys.readouterr().out
-    assert "95 of 103 published figures reproduce" in out
-    assert main(["survey", "fit"]) == 0
-    assert "1.105" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["humanoid", "quadruped"])

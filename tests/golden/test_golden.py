@@ -19,14 +19,11 @@ import pytest
 
 import draft
 from draft.values import plain
+from tests.model.shipped import SHIPPED, built
 
 RECORDS = Path(__file__).parent / "records"
 OURS, MUJOCOS = 1e-9, 1e-6
-DESIGNS = [
-    pytest.param(name, label, id=f"{name}-{label or 'default'}")
-    for name in draft.shipped()
-    for label in (None, *draft.load(name).designs)
-]
+DESIGNS = [pytest.param(name, label, id=f"{name}-{label or 'default'}") for name, label in SHIPPED]
 # Compiled arrays that any release of MuJoCo has, and that say what robot it is.
 ARRAYS = (
     "body_mass",
@@ -182,11 +179,11 @@ def check(name: str, record: dict[str, Any], tolerances: dict[str, float], renew
 def test_a_shipped_design_comes_to_the_accepted_numbers(
     name: str, label: str | None, request: pytest.FixtureRequest
 ) -> None:
-    design = draft.load(name).resolve(label)
+    model = built(name, label)
     record = {
-        "resolved": resolved(design),
-        "findings": findings(design),
-        "mujoco": compiled(design.build().mujoco),
+        "resolved": resolved(model.design),
+        "findings": findings(model.design),
+        "mujoco": compiled(model.mujoco),
     }
     tolerances = {"resolved": OURS, "findings": OURS, "mujoco": MUJOCOS}
     renew = bool(request.config.getoption("force_regen"))
@@ -195,28 +192,13 @@ def test_a_shipped_design_comes_to_the_accepted_numbers(
 
 @pytest.mark.parametrize("name", draft.shipped())
 def test_a_shipped_robots_parts_keep_their_names(name: str, request: pytest.FixtureRequest) -> None:
-    found = names(draft.load(name).resolve().build().mujoco)
+    found = names(built(name, None).mujoco)
     check(f"{name}-names", found, {}, bool(request.config.getoption("force_regen")))
 
 
-@pytest.mark.parametrize(
-    ("label", "published"), [("cheetah", 33.0), ("bear", 110.0), ("giraffe", 91.0)]
-)
-def test_the_quadrupeds_weigh_what_was_published(label: str, published: float) -> None:
-    design = draft.load("quadruped").resolve(label)
-    assert design.mass == pytest.approx(published, rel=0.06)
-
-
-def test_the_humanoid_has_29_joints() -> None:
-    assert len(draft.load("humanoid").resolve().joints) == 29
-
-
-def test_all_designs_of_a_robot_have_the_same_parts() -> None:
-    for name in draft.shipped():
-        spec = draft.load(name)
-        default = names(spec.resolve().build().mujoco)
-        for label in spec.designs:
-            assert names(spec.resolve(label).build().mujoco) == default
+@pytest.mark.parametrize(("name", "label"), SHIPPED)
+def test_all_designs_of_a_robot_have_the_same_parts(name: str, label: str | None) -> None:
+    assert names(built(name, label).mujoco) == names(built(name, None).mujoco)
 
 
 def test_every_record_is_of_a_shipped_design() -> None:

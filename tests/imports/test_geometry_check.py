@@ -15,8 +15,7 @@ from draft.description import description as descriptions
 from draft.description import mjcf
 from draft.description.description import Joint
 from draft.description.xmlfile import DescriptionError, read_text
-from draft.imports.importer import Imported, import_robot
-from tests.imports.written import quadruped
+from tests.imports.written import imported, quadruped
 
 INERTIAL = '<inertial pos="0 0 -.1" mass="1" diaginertia=".01 .01 .01"/>'
 FOOT = '<geom type="sphere" size=".03" pos="0 0 -.25"/>'
@@ -99,20 +98,13 @@ PLACED = {
 }
 
 
-def made(text: str, folder: Path, kind: str = "xml") -> Imported:
-    """Import a description's text."""
-    path = folder / f"beast.{kind}"
-    path.write_text(text)
-    return import_robot(path, folder / "out")
-
-
 @pytest.mark.parametrize("name", PLACED)
 def test_feet_are_where_mujoco_puts_them_at_the_same_joint_positions(
-    name: str, tmp_path: Path
+    name: str,
 ) -> None:
-    found = made(PLACED[name], tmp_path)
-    maker = mujoco.MjModel.from_xml_path(str(tmp_path / "beast.xml"))
-    ours = load(tmp_path / "out").resolve().build().mujoco
+    found = imported(PLACED[name], "beast.xml")
+    maker = mujoco.MjModel.from_xml_path("beast.xml")
+    ours = load("mine").resolve().build().mujoco
     same = {joint: joint for joint in found.joints}
     assert np.allclose(
         foot_heights(maker, same, ""), foot_heights(ours, found.joints, "_end"), atol=2e-4
@@ -121,28 +113,25 @@ def test_feet_are_where_mujoco_puts_them_at_the_same_joint_positions(
     assert found.geometry.joints == 4
 
 
-def test_a_urdf_is_held_against_mujocos_compile_too(tmp_path: Path) -> None:
-    found = made(quadruped(), tmp_path, "urdf")
+def test_a_urdf_is_held_against_mujocos_compile_too() -> None:
+    found = imported(quadruped())
     assert (found.geometry.joints, found.geometry.poses, found.geometry.skipped) == (12, 20, "")
     assert 0 < found.geometry.distance < 1e-4
 
 
 def test_a_reader_that_ignores_ref_is_caught_with_the_joints_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(mjcf, "displaced", lambda joint, position: descriptions.displaced(joint, 0))
     with pytest.raises(DescriptionError) as caught:
-        made(PLACED["ref in degrees"], tmp_path)
-    assert "joint 'l_knee_pitch' is not where MuJoCo's compile of this file has it" in str(
-        caught.value
-    )
-    assert not (tmp_path / "out").exists()
+        imported(PLACED["ref in degrees"], "beast.xml")
+    words = "joint 'l_knee_pitch' is not where MuJoCo's compile of this file has it"
+    assert words in str(caught.value)
+    assert not Path("mine").exists()
 
 
 @pytest.mark.parametrize("change", ["axis", "limits"])
-def test_another_axis_or_limit_is_caught(
-    change: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_axis_or_limit_is_caught(change: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A reader off by little more than is allowed: 0.02 degrees."""
     off = 3.5e-4
     plain = mjcf._Reader._joint
@@ -155,31 +144,31 @@ def test_another_axis_or_limit_is_caught(
 
     monkeypatch.setattr(mjcf._Reader, "_joint", wrong)
     with pytest.raises(DescriptionError, match=r"(axis|limit) off by 0\.0"):
-        made(biped('range="-60 57.29578"', 'range="-164 57.29578"'), tmp_path)
+        imported(biped('range="-60 57.29578"', 'range="-164 57.29578"'), "beast.xml")
 
 
-def test_a_passive_joint_is_held_where_its_spring_or_its_limits_leave_it(tmp_path: Path) -> None:
-    passive = '<joint name="{}_knee_pitch" axis="0 1 0" {}/>'
+def test_a_passive_joint_is_held_where_its_spring_or_its_limits_leave_it() -> None:
+    driven = '_knee_pitch" axis="0 1 0" actuatorfrcrange="-40 40" range="-164 -37"/>'
     text = biped('range="-60 90"', 'range="-164 -37"')
     for side, given in (
         ("l", 'stiffness="5" springref="-40" range="-164 -37"'),
         ("r", 'range="-164 -50" ref="-45"'),
     ):
-        old = passive.format(side, 'actuatorfrcrange="-40 40" range="-164 -37"').replace("  ", " ")
-        assert old in text
-        text = text.replace(old, passive.format(side, given))
+        assert side + driven in text
+        text = text.replace(side + driven, f'{side}_knee_pitch" axis="0 1 0" {given}/>')
     held = {
         joint.name: np.degrees(joint.held_at)
         for joint in mjcf.from_xml(read_text(text, "b.xml")).moving
     }
     assert held["l_knee_pitch"] == pytest.approx(-40)
     assert held["r_knee_pitch"] == pytest.approx(-50)
-    found = made(text, tmp_path)
+    found = imported(text, "beast.xml")
     assert found.geometry.joints == 2
     assert found.geometry.skipped == ""
 
 
-def test_a_file_that_mujoco_refuses_is_imported_and_not_checked(tmp_path: Path) -> None:
+def test_a_file_that_mujoco_refuses_is_imported_and_not_checked() -> None:
     text = biped('range="-60 90"', 'range="-164 -37"')
-    found = made(text.replace('<body name="r_shank"', '<body name="l_thigh2" wrong="1"'), tmp_path)
+    wrong = text.replace('<body name="r_shank"', '<body name="l_thigh2" wrong="1"')
+    found = imported(wrong, "beast.xml")
     assert "MuJoCo does not compile its joints" in found.geometry.skipped

@@ -10,13 +10,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from draft.__main__ import main
 from draft.description import mjcf, urdf
+from draft.description.description import Description
 from draft.description.xmlfile import read_text
 from draft.imports.drives import leg_length
-from draft.imports.importer import import_robot, translate
 from draft.imports.limbs import Limbs, find_limbs, upright
-from tests.imports.written import joint, link, quadruped
+from tests.commands import printed
+from tests.imports.written import bolt, imported, joint, link, quadruped, translated, written
 
 Point = Sequence[float]
 DOWN = ((0, 0, -0.3), (0, 0, -0.3))
@@ -33,8 +33,7 @@ def limb(name: str, parent: str, at: Point, ways: Sequence[Point] = DOWN, limit:
         parent = child
     lines += [
         f'<link name="{name}_tip"/>',
-        f'<joint name="{name}_end" type="fixed"><parent link="{parent}"/>'
-        f'<child link="{name}_tip"/><origin xyz="{" ".join(map(str, ways[-1]))}"/></joint>',
+        bolt(f"{name}_end", parent, f"{name}_tip", " ".join(map(str, ways[-1]))),
     ]
     return "\n".join(lines)
 
@@ -43,10 +42,14 @@ def robot(*parts: str) -> str:
     return "\n".join(['<robot name="unnamed">', link("base"), *parts, "</robot>"])
 
 
-def found(text: str, wanted: str | None = None) -> Limbs:
+def turned(text: str) -> tuple[Description, str]:
+    """A description with its z axis up, and what was turned."""
     root = read_text(text, "r.urdf")
-    read = urdf.from_xml(root) if root.tag == "robot" else mjcf.from_xml(root)
-    return find_limbs(upright(read)[0], wanted)
+    return upright(urdf.from_xml(root) if root.tag == "robot" else mjcf.from_xml(root))
+
+
+def found(text: str, wanted: str | None = None) -> Limbs:
+    return find_limbs(turned(text)[0], wanted)
 
 
 def legs(*places: tuple[float, float], ways: Sequence[Point] = DOWN) -> list[str]:
@@ -55,27 +58,40 @@ def legs(*places: tuple[float, float], ways: Sequence[Point] = DOWN) -> list[str
 
 BIPED, FOUR = ((0, 0.1), (0, -0.1)), ((0.3, 0.1), (0.3, -0.1), (-0.3, 0.1), (-0.3, -0.1))
 SIX = (*FOUR, (0, 0.12), (0, -0.12))
-LEFT, RIGHT = ((0.1, 0, 0), (0.3, 0, 0)), ((-0.1, 0, 0), (-0.3, 0, 0))
+LEFT = ((0.1, 0, 0), (0.3, 0, 0))
 ARMS = (limb("a", "base", (0, 0.2, 0.4)), limb("b", "base", (0, -0.2, 0.4)))
 TUCKED, CASTER = ((0, 0, -0.3), (0, 0, 0.3)), ((0, 0, -0.02), (0, 0, -0.05))
 UP = ((0, 0, 0.3), (0, 0, 0.3), (0.2, 0, 0))
-# What a robot is made of: population, legs, arms and the beginning of the reason.
+TWO, FOURS = "two limbs reach the ground", "four limbs reach the ground"
+NONE = "no limb reaches the ground"
+FLAT = [
+    limb(f"l{i}", "base", (x, y, 0), ((0, math.copysign(0.1, y), 0),) * 2).replace(
+        'axis xyz="0 1 0"', 'axis xyz="1 0 0"'
+    )
+    for i, (x, y) in enumerate(SIX)
+]
+REAR = (
+    link("rear"),
+    joint("spine", "base", "rear", (-0.3, 0, 0), "0 0 1"),
+    limb("x", "rear", (-0.3, 0.1, 0)),
+    limb("y", "rear", (-0.3, -0.1, 0)),
+)
+RODS = [limb(f"rod{i}", f"l{i}0", (0.03, 0, 0), ((0, 0, -0.5), (0, 0, -0.1))) for i in range(2)]
+FINGERS = [limb(f"f{y}", "base", (0.1, y, 0), LEFT) for y in (0.04, 0, -0.04)]
+THUMB = limb("thumb", "base", (0, 0.05, 0), ((0.05, 0.05, 0), (0.2, 0, 0)))
+CASTERS = [limb(f"c{i}", "base", (x, y, 0), CASTER) for i, (x, y) in enumerate(FOUR)]
+HIND = [limb(f"h{y}", "base", (-0.3, y, 0), TUCKED) for y in (0.1, -0.1)]
+RAISED = [limb(f"a{y}", "base", (0, y, 0.4), UP) for y in (0.2, -0.2)]
+ARM = limb("arm", "base", (0.2, 0, 0.1), UP)
+# What a robot is made of, its population, legs and arms, and the beginning of the reason.
 KINDS: dict[str, tuple[str, str, int, int, str]] = {
-    "a biped": (robot(*legs(*BIPED)), "humanoid", 2, 0, "two limbs reach the ground"),
+    "a biped": (robot(*legs(*BIPED)), "humanoid", 2, 0, TWO),
     "a humanoid": (
-        robot(*legs(*BIPED), *(limb(f"a{y}", "base", (0, y, 0.4), UP) for y in (0.2, -0.2))),
-        "humanoid",
-        2,
-        2,
-        "two limbs reach the ground, 2 others do not",
+        robot(*legs(*BIPED), *RAISED), "humanoid", 2, 2, f"{TWO}, 2 others do not"
     ),
-    "a quadruped": (robot(*legs(*FOUR)), "quadruped", 4, 0, "four limbs reach the ground"),
+    "a quadruped": (robot(*legs(*FOUR)), "quadruped", 4, 0, FOURS),
     "a quadruped with an arm": (
-        robot(*legs(*FOUR), limb("arm", "base", (0.2, 0, 0.1), UP)),
-        "quadruped",
-        4,
-        1,
-        "four limbs reach the ground, 1 other does not",
+        robot(*legs(*FOUR), ARM), "quadruped", 4, 1, f"{FOURS}, 1 other does not"
     ),
     "a hexapod": (
         robot(*legs(*SIX)),
@@ -85,74 +101,23 @@ KINDS: dict[str, tuple[str, str, int, int, str]] = {
         "6 limbs reach the ground: the trends of quadrupeds are the nearest",
     ),
     "a hexapod that lies flat at zero": (
-        robot(
-            *(
-                limb(f"l{i}", "base", (x, y, 0), ((0, math.copysign(0.1, y), 0),) * 2)
-                .replace('axis xyz="0 1 0"', 'axis xyz="1 0 0"')
-                for i, (x, y) in enumerate(SIX)
-            )
-        ),
-        "quadruped",
-        6,
-        0,
-        "6 limbs reach the ground",
+        robot(*FLAT), "quadruped", 6, 0, "6 limbs reach the ground"
     ),
     "a quadruped whose hind legs are tucked at zero": (
-        robot(
-            *legs(*FOUR[:2]),
-            *(limb(f"h{y}", "base", (-0.3, y, 0), TUCKED) for y in (0.1, -0.1)),
-        ),
-        "quadruped",
-        4,
-        0,
-        "four limbs reach the ground",
+        robot(*legs(*FOUR[:2]), *HIND), "quadruped", 4, 0, FOURS
     ),
-    "a quadruped with a spine": (
-        robot(
-            *legs(*FOUR[:2]),
-            link("rear"),
-            joint("spine", "base", "rear", (-0.3, 0, 0), "0 0 1"),
-            limb("x", "rear", (-0.3, 0.1, 0)),
-            limb("y", "rear", (-0.3, -0.1, 0)),
-        ),
-        "quadruped",
-        4,
-        0,
-        "four limbs reach the ground",
-    ),
+    "a quadruped with a spine": (robot(*legs(*FOUR[:2]), *REAR), "quadruped", 4, 0, FOURS),
     "a biped with a rod beside each shank": (
-        robot(
-            *legs(*BIPED),
-            limb("rod0", "l00", (0.03, 0, 0), ((0, 0, -0.5), (0, 0, -0.1))),
-            limb("rod1", "l10", (0.03, 0, 0), ((0, 0, -0.5), (0, 0, -0.1))),
-        ),
-        "humanoid",
-        2,
-        0,
-        "two limbs reach the ground",
+        robot(*legs(*BIPED), *RODS), "humanoid", 2, 0, TWO
     ),
-    "an arm": (robot(limb("arm", "base", (0, 0, 0.1), UP)), "humanoid", 0, 1, "no limb reaches"),
-    "an arm that hangs": (robot(limb("arm", "base", (0, 0, -0.1))), "humanoid", 0, 0, "no limb"),
-    "two arms on a stand": (robot(*ARMS), "humanoid", 0, 0, "no limb reaches the ground"),
-    "a hand": (
-        robot(*(limb(f"f{y}", "base", (0.1, y, 0), LEFT) for y in (0.04, 0, -0.04)),
-              limb("thumb", "base", (0, 0.05, 0), ((0.05, 0.05, 0), (0.2, 0, 0)))),
-        "humanoid",
-        0,
-        0,
-        "no limb reaches the ground",
-    ),
+    "an arm": (robot(limb("arm", "base", (0, 0, 0.1), UP)), "humanoid", 0, 1, NONE),
+    "an arm that hangs": (robot(limb("arm", "base", (0, 0, -0.1))), "humanoid", 0, 0, NONE),
+    "two arms on a stand": (robot(*ARMS), "humanoid", 0, 0, NONE),
+    "a hand": (robot(*FINGERS, THUMB), "humanoid", 0, 0, NONE),
     "a cart on casters with an arm": (
-        robot(
-            *(limb(f"c{i}", "base", (x, y, 0), CASTER) for i, (x, y) in enumerate(FOUR)),
-            limb("arm", "base", (0, 0, 0.8), UP),
-        ),
-        "humanoid",
-        0,
-        1,
-        "no limb reaches the ground",
+        robot(*CASTERS, limb("arm", "base", (0, 0, 0.8), UP)), "humanoid", 0, 1, NONE
     ),
-    "nothing that moves": (robot(), "humanoid", 0, 0, "no limb reaches the ground"),
+    "nothing that moves": (robot(), "humanoid", 0, 0, NONE),
 }  # fmt: skip
 
 
@@ -162,6 +127,11 @@ def test_a_robot_is_what_its_limbs_are(kind: str) -> None:
     limbs = found(text)
     assert (limbs.population, limbs.legs, limbs.arms) == (population, count, arms)
     assert limbs.reason.startswith(reason)
+
+
+def test_a_robot_of_three_legs_is_nearest_to_quadrupeds() -> None:
+    limbs = found(robot(*legs(*FOUR[:2], (-0.3, 0))))
+    assert (limbs.population, limbs.legs) == ("quadruped", 3)
 
 
 def test_a_hopper_has_a_leg_where_its_base_is_free() -> None:
@@ -177,18 +147,19 @@ def test_a_hopper_has_a_leg_where_its_base_is_free() -> None:
     assert found(text.format("")).legs == 0
 
 
-def test_a_robot_whose_y_axis_points_up_is_turned() -> None:
-    ways = ((0, -0.3, 0), (0, -0.3, 0))
-    text = robot(limb("l", "base", (0, 0, -0.1), ways), limb("r", "base", (0, 0, 0.1), ways))
-    turned, axis = upright(urdf.from_xml(read_text(text, "r.urdf")))
-    assert axis == "y axis points up"
-    assert find_limbs(turned).legs == 2
+BESIDE = ((0, -0.3, 0), (0, -0.3, 0))
+TURNED = {
+    "y axis points up": robot(
+        limb("l", "base", (0, 0, -0.1), BESIDE), limb("r", "base", (0, 0, 0.1), BESIDE)
+    ),
+    "y axis points forward": robot(*legs((0.1, 0), (-0.1, 0))),
+}
 
 
-def test_a_biped_that_faces_along_y_is_turned() -> None:
-    turned, axis = upright(urdf.from_xml(read_text(robot(*legs((0.1, 0), (-0.1, 0))), "r.urdf")))
-    assert axis == "y axis points forward"
-    assert find_limbs(turned).legs == 2
+@pytest.mark.parametrize("axis", TURNED)
+def test_a_biped_with_other_axes_is_turned(axis: str) -> None:
+    assert turned(TURNED[axis])[1] == axis
+    assert found(TURNED[axis]).legs == 2
 
 
 def test_a_stated_population_holds_and_is_said() -> None:
@@ -198,18 +169,14 @@ def test_a_stated_population_holds_and_is_said() -> None:
 
 
 @pytest.mark.parametrize("name", ["torso.urdf", "unitree_g1.urdf", "ankle_arm.urdf", "spot.urdf"])
-def test_the_files_name_decides_nothing(name: str, tmp_path: Path) -> None:
-    (tmp_path / name).write_text(quadruped())
-    made = import_robot(tmp_path / name, tmp_path / "out")
-    assert made.spec.population == "quadruped"
-    (tmp_path / "r.urdf").write_text(quadruped())
-    plain = import_robot(tmp_path / "r.urdf", tmp_path / "plain")
-    tree = (tmp_path / "out" / "tree.yaml").read_text()
-    assert tree == (tmp_path / "plain" / "tree.yaml").read_text()
-    assert made.joints == plain.joints
+def test_the_files_name_decides_nothing(name: str) -> None:
+    named, plain = imported(quadruped(), name, "out"), imported(quadruped(), "r.urdf", "plain")
+    assert named.spec.population == "quadruped"
+    assert Path("out/tree.yaml").read_text() == Path("plain/tree.yaml").read_text()
+    assert named.joints == plain.joints
 
 
-def test_a_hexapod_is_built_and_stands(tmp_path: Path) -> None:
+def test_a_hexapod_is_built_and_stands() -> None:
     """Six legs of yaw, pitch and knee, whose names share nothing but their numbers."""
     limit = 'lower="-1.2" upper="1.2" effort="8" velocity="12"'
     parts = [link("base", 3.0)]
@@ -221,14 +188,13 @@ def test_a_hexapod_is_built_and_stands(tmp_path: Path) -> None:
             joint(f"s{3 * i}", "base", names[0], (x, y, 0), "0 0 1", limit),
             joint(f"s{3 * i + 1}", names[0], names[1], (0, 0.06 * side, 0), "1 0 0", limit),
             joint(f"s{3 * i + 2}", names[1], names[2], (0, 0.1 * side, 0), "1 0 0", limit),
-            f'<link name="tip{i}"/><joint name="end{i}" type="fixed"><parent link="{names[2]}"/>'
-            f'<child link="tip{i}"/><origin xyz="0 {0.02 * side} -0.15"/></joint>',
+            f'<link name="tip{i}"/>',
+            bolt(f"end{i}", names[2], f"tip{i}", f"0 {0.02 * side} -0.15"),
         ]
-    (tmp_path / "r.urdf").write_text("\n".join(['<robot name="six">', *parts, "</robot>"]))
-    made = import_robot(tmp_path / "r.urdf", tmp_path / "out")
+    made = imported("\n".join(['<robot name="six">', *parts, "</robot>"]))
     assert (made.limbs.legs, made.spec.population) == (6, "quadruped")
     assert len(set(made.joints.values())) == 18
-    folder = made.spec.resolve().build().save(tmp_path / "model")
+    folder = made.spec.resolve().build().save(Path("model"))
     scene = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
     data = mujoco.MjData(scene)
     mujoco.mj_resetDataKeyframe(scene, data, 0)
@@ -238,27 +204,20 @@ def test_a_hexapod_is_built_and_stands(tmp_path: Path) -> None:
     assert data.xmat[1][8] > 0.98
 
 
-def test_a_robot_without_legs_gets_no_verdict(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("seven.urdf").write_text(robot(limb("arm", "base", (0, 0, 0.1), UP)))
-    assert main(["import", "seven.urdf", "--out", "arm"]) == 0
+def test_a_robot_without_legs_gets_no_verdict() -> None:
+    written(robot(limb("arm", "base", (0, 0, 0.1), UP)), "seven.urdf")
     said = "no limb reaches the ground; the structure trends do not apply"
-    assert said in capsys.readouterr().out
-    assert main(["check", "arm"]) == 1
-    out = capsys.readouterr().out
+    assert said in printed("import", "seven.urdf", "--out", "arm")
+    out = printed("check", "arm", code=1)
     assert said in out
     assert "not judged" in out
     assert "accepted" not in out
 
 
-def test_the_knee_of_a_leg_of_many_hinges_is_nearest_to_its_middle(tmp_path: Path) -> None:
+def test_the_knee_of_a_leg_of_many_hinges_is_nearest_to_its_middle() -> None:
     """Two hinges at the hip, a knee, and an ankle of two."""
     ways = ((0, 0, -0.05), (0, 0, -0.3), (0, 0, -0.3), (0, 0, -0.03), (0, 0, -0.05))
-    path = tmp_path / "r.urdf"
-    path.write_text(robot(*legs(*FOUR, ways=ways)), encoding="utf-8")
-    files = translate(path, "r")
+    files = translated(robot(*legs(*FOUR, ways=ways)))
     limb = [body for body in files.reduced.root.all() if body.name.startswith("l0")]
     assert [body.role for body in limb] == ["abduction", "flexion", "knee", "ankle", "ankle"]
     assert leg_length(files.reduced) == pytest.approx(0.6)
@@ -277,38 +236,33 @@ def test_a_fixed_mjcf_whose_y_axis_points_up_and_whose_z_points_forward_is_turne
         for x in (0.1, -0.1)
     )
     body = f'<body name="root"><geom type="box" size=".1 .1 .05"/>{text}</body>'
-    read = mjcf.from_xml(read_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>", "r.xml"))
-    turned, axis = upright(read)
+    made, axis = turned(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     assert axis == "y axis points up"
-    up, ahead = (np.array(turned.turned) @ axis for axis in ([0, 1, 0], [0, 0, forward]))
-    assert up == pytest.approx([0, 0, 1])
-    assert ahead == pytest.approx([1, 0, 0])
-    assert find_limbs(turned).legs == 2
+    assert np.array(made.turned) @ [0, 1, 0] == pytest.approx([0, 0, 1])
+    assert np.array(made.turned) @ [0, 0, forward] == pytest.approx([1, 0, 0])
+    assert find_limbs(made).legs == 2
 
 
-def test_a_middle_limb_between_two_arms_is_a_neck(tmp_path: Path) -> None:
+SIDES = (0.2, -0.2)
+
+
+def test_a_middle_limb_between_two_arms_is_a_neck() -> None:
     """A neck of four hinges is no arm; an arm of six on a trunk without others is one."""
     ways = ((0, 0, 0.03), (0, 0, 0.1), (0, 0, 0.03), (0, 0, 0.1))
     arms = [limb(f"a{i}", "base", (0, y, 0.4), ((0, 0, -0.15),) * 3) for i, y in enumerate(SIDES)]
-    (tmp_path / "r.urdf").write_text(
-        robot(*legs(*BIPED), *arms, limb("n", "base", (0, 0, 0.5), ways)), encoding="utf-8"
-    )
-    bodies = translate(tmp_path / "r.urdf", "r").reduced.root.all()
+    files = translated(robot(*legs(*BIPED), *arms, limb("n", "base", (0, 0, 0.5), ways)))
+    bodies = files.reduced.root.all()
     assert {body.role for body in bodies if body.name.startswith("n")} == {"neck"}
 
 
-def test_the_spine_of_a_torso_without_legs_carries_all_of_it(tmp_path: Path) -> None:
+def test_the_spine_of_a_torso_without_legs_carries_all_of_it() -> None:
     """A spine's 150 N m are plausible, though nothing but a plate is on its other side."""
     arms = [limb(f"a{i}", "chest", (0, y, 0.4), ((0.2, 0, 0),) * 3) for i, y in enumerate(SIDES)]
     limit = 'lower="-1" upper="1" effort="150" velocity="5"'
     spine = [link("chest"), joint("spine", "base", "chest", (0, 0, 0.1), limit=limit)]
-    (tmp_path / "r.urdf").write_text(robot(*spine, *arms), encoding="utf-8")
-    files = translate(tmp_path / "r.urdf", "r")
+    files = translated(robot(*spine, *arms))
     assert not files.limbs.legs
     assert files.drives["spine"].torque_from == "declared"
-
-
-SIDES = (0.2, -0.2)
 
 
 def headed(*antennas: str) -> str:
@@ -328,18 +282,7 @@ def headed(*antennas: str) -> str:
 @pytest.mark.parametrize(
     "antennas", [("revolute",), ("revolute", "revolute"), ("prismatic",) * 3], ids=str
 )
-def test_a_head_with_antennas_is_not_the_trunk(antennas: tuple[str, ...], tmp_path: Path) -> None:
-    plain = bare_biped()
-    path = tmp_path / "walker.urdf"
-    path.write_text(plain.replace("</robot>", headed(*antennas) + "</robot>"), encoding="utf-8")
-    reduced = translate(path, "walker").reduced
-    assert reduced.root.name == "torso"
-    roles = {body.joint.name: body.role for body in reduced.root.all() if body.joint}
-    assert roles["neck_yaw"] == roles["neck_pitch"] == "neck"
-
-
-def bare_biped() -> str:
-    """A biped without arms."""
+def test_a_head_with_antennas_is_not_the_trunk(antennas: tuple[str, ...]) -> None:
     text = link("torso", 8.0)
     for side, y in (("left", 0.1), ("right", -0.1)):
         for name, above, at in (
@@ -349,4 +292,7 @@ def bare_biped() -> str:
         ):
             own = f"{side}_{name}"
             text += link(own) + joint(f"{own}_joint", above, own, at)
-    return f'<robot name="walker">{text}</robot>'
+    reduced = translated(f'<robot name="walker">{text}{headed(*antennas)}</robot>').reduced
+    assert reduced.root.name == "torso"
+    roles = {body.joint.name: body.role for body in reduced.root.all() if body.joint}
+    assert roles["neck_yaw"] == roles["neck_pitch"] == "neck"

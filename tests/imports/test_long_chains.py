@@ -8,16 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from draft.cli import main
 from draft.description.xmlfile import DescriptionError
-from draft.imports.importer import Imported, import_robot
-from tests.imports.written import joint, link
-
-
-def made(text: str, folder: Path) -> Imported:
-    path = folder / "snake.urdf"
-    path.write_text(text, encoding="utf-8")
-    return import_robot(path, folder / "out")
+from draft.imports.importer import Imported
+from tests.commands import refusal
+from tests.imports.written import imported, joint, link, notes, written
 
 
 def chain(count: int, kind: str = "revolute", first: str = "revolute") -> str:
@@ -43,9 +37,9 @@ def turned_chain(count: int) -> str:
     return '<robot name="snake">\n' + "\n".join(lines) + "\n</robot>"
 
 
-def gaps(found: Imported, folder: Path) -> tuple[float, float]:
+def gaps(found: Imported) -> tuple[float, float]:
     """Largest distance [m] and angle [rad] of hinges from MuJoCo's own model of the file."""
-    text = (folder / "snake.urdf").read_text()
+    text = Path("beast.urdf").read_text()
     text = text.replace('">', '"><mujoco><compiler fusestatic="false"/></mujoco>', 1)
     theirs, ours = mujoco.MjModel.from_xml_string(text), found.spec.resolve().build().mujoco
     a, b = mujoco.MjData(theirs), mujoco.MjData(ours)
@@ -66,8 +60,8 @@ def gaps(found: Imported, folder: Path) -> tuple[float, float]:
     return most[0], most[1]
 
 
-def test_roundings_do_not_add_up_along_a_chain(tmp_path: Path) -> None:
-    distance, angle = gaps(made(turned_chain(100), tmp_path), tmp_path)
+def test_roundings_do_not_add_up_along_a_chain() -> None:
+    distance, angle = gaps(imported(turned_chain(100)))
     assert distance < 1e-5
     assert angle < 1e-6
 
@@ -88,41 +82,37 @@ def arms(hinges: int, off: float) -> str:
 
 
 @pytest.mark.parametrize("off", [5e-5, 1.2e-4])
-def test_small_differences_of_two_limbs_do_not_add_up(tmp_path: Path, off: float) -> None:
+def test_small_differences_of_two_limbs_do_not_add_up(off: float) -> None:
     """Each hinge is within 0.01 degrees of its mirror image, the last one's frame is not."""
-    distance, angle = gaps(made(arms(7, off), tmp_path), tmp_path)
+    distance, angle = gaps(imported(arms(7, off)))
     assert distance < 1e-4
     assert angle < np.radians(0.01)
 
 
-def test_a_single_small_difference_leaves_two_limbs_copies(tmp_path: Path) -> None:
-    found = made(arms(7, 1e-6), tmp_path)
+def test_a_single_small_difference_leaves_two_limbs_copies() -> None:
+    found = imported(arms(7, 1e-6))
     assert found.files.mirrored == 1
     assert not found.files.deviations
 
 
 @pytest.mark.parametrize("count", [250, 990, 2500])
-def test_a_chain_that_is_too_long_is_refused_by_its_joint(tmp_path: Path, count: int) -> None:
+def test_a_chain_that_is_too_long_is_refused_by_its_joint(count: int) -> None:
     with pytest.raises(DescriptionError, match=r"'j200' is the 200th in series.* at most 199"):
-        made(chain(count), tmp_path)
+        imported(chain(count))
 
 
-def test_a_chain_too_long_ends_the_command_with_a_message(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("snake.urdf").write_text(chain(990), encoding="utf-8")
-    for command in ("import", "twin"):
-        assert main([command, "snake.urdf"]) == 2
-        assert "snake.urdf:" in capsys.readouterr().err
+@pytest.mark.parametrize("command", ["import", "twin"])
+def test_a_chain_too_long_ends_the_command_with_a_message(command: str) -> None:
+    written(chain(990), "snake.urdf")
+    assert refusal(command, "snake.urdf").startswith("snake.urdf:")
 
 
-def test_the_longest_chain_is_imported(tmp_path: Path) -> None:
-    assert len(made(chain(199), tmp_path).joints) == 199
+def test_the_longest_chain_is_imported() -> None:
+    assert len(imported(chain(199)).joints) == 199
 
 
-def test_links_that_mujoco_cannot_read_are_merged_and_told(tmp_path: Path) -> None:
-    found = made(chain(2000, "fixed"), tmp_path)
+def test_links_that_mujoco_cannot_read_are_merged_and_told() -> None:
+    found = imported(chain(2000, "fixed"))
     assert len(found.joints) == 1
-    (told,) = (str(note) for note in found.notes if "not compared with MuJoCo's" in str(note))
+    (told,) = notes(found, "not compared with MuJoCo's")
     assert "2001 links" in told or "depth limit" in told  # The words of MuJoCo 3, and of 4.

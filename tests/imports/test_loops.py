@@ -11,23 +11,20 @@ import pytest
 
 from draft.description.description import Description
 from draft.description.read import describe
-from draft.imports.importer import Files, import_robot, translate
 from draft.imports.limbs import find_limbs
 from draft.imports.loops import open_loops
-from tests.imports.written import joint, link
+from tests.imports.written import LEGS, bolt, imported, joint, link, notes, translated, written
 
 FREE = 'lower="-2" upper="2" effort="0" velocity="20"'
 
 
-def four_bar(crank: float = 0.05, knee: str = FREE, more: str = "") -> str:
+def four_bar(crank: float = 0.05, knee: str = FREE) -> str:
     """A quadruped whose knees are moved by cranks at the hips through rods.
 
     The rod and the crank are hung on the thigh; the rod ends on the shank, 50 mm behind the knee.
     """
     lines = [link("body", 8.0)]
-    for name, (x, y) in {
-        "FL": (0.2, 0.1), "FR": (0.2, -0.1), "RL": (-0.2, 0.1), "RR": (-0.2, -0.1),
-    }.items():  # fmt: skip
+    for name, (x, y) in LEGS.items():
         side = 1 if y > 0 else -1
         lines += [link(f"{name}_{part}") for part in ("hip", "thigh", "crank", "rod", "calf")]
         lines += [
@@ -38,51 +35,39 @@ def four_bar(crank: float = 0.05, knee: str = FREE, more: str = "") -> str:
             joint(f"{name}_rod_top", f"{name}_crank", f"{name}_rod", (-crank, 0, 0), limit=FREE),
             joint(f"{name}_rod_end", f"{name}_rod", f"{name}_calf", (0, 0, -0.22), limit=FREE),
             f'<link name="{name}_foot"/>',
-            f'<joint name="{name}_ball" type="fixed"><parent link="{name}_calf"/>'
-            f'<child link="{name}_foot"/><origin xyz="0 0 -0.21"/></joint>',
+            bolt(f"{name}_ball", f"{name}_calf", f"{name}_foot", "0 0 -0.21"),
         ]
-    return '<robot name="beast">\n' + "\n".join([*lines, more]) + "\n</robot>\n"
+    return '<robot name="beast">\n' + "\n".join(lines) + "\n</robot>\n"
 
 
-def written(folder: Path, text: str, ending: str = "urdf") -> Path:
-    path = folder / f"robot.{ending}"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def translated(folder: Path, text: str, ending: str = "urdf") -> Files:
-    return translate(written(folder, text, ending), "robot")
-
-
-def notes(files: Files, word: str) -> list[str]:
-    return [str(note) for note in files.reduced.notes if word in str(note)]
-
-
-def test_a_loop_is_cut_at_the_end_of_its_rod(tmp_path: Path) -> None:
-    found = describe(written(tmp_path, four_bar()))
+def test_a_loop_is_cut_at_the_end_of_its_rod() -> None:
+    found = describe(written(four_bar()))
     assert "FL_knee" in found.joints
-    assert [loop.name for loop in found.loops] == [f"{n}_rod_end" for n in ("FL", "FR", "RL", "RR")]
+    assert [loop.name for loop in found.loops] == [f"{name}_rod_end" for name in LEGS]
 
 
-def test_a_drive_on_a_linkage_moves_the_joint_of_the_limb(tmp_path: Path) -> None:
-    files = translated(tmp_path, four_bar())
-    assert set(files.drives) == {f"{n}_{j}" for n in ("FL", "FR", "RL", "RR") for j in
-                                 ("roll", "pitch", "knee")}  # fmt: skip
+def test_a_drive_on_a_linkage_moves_the_joint_of_the_limb() -> None:
+    files = translated(four_bar())
+    assert set(files.drives) == {f"{n}_{j}" for n in LEGS for j in ("roll", "pitch", "knee")}
     knee = files.drives["FL_knee"]
     assert (knee.torque, knee.speed, knee.torque_from) == (30, 20, "declared")
     assert files.knees.place == "hip"
     assert "FL_crank_joint" in files.knees.why
-    words = notes(files, "closed loop 'FL_rod_end' between 'FL_rod' and 'FL_calf' is cut")
-    assert len(words) == 1
-    assert "the drive of 'FL_crank_joint' moves 'FL_knee' instead" in words[0]
+    (told,) = notes(files, "closed loop 'FL_rod_end' between 'FL_rod' and 'FL_calf' is cut")
+    assert "the drive of 'FL_crank_joint' moves 'FL_knee' instead" in told
 
 
-def test_the_limb_keeps_a_drive_of_its_own(tmp_path: Path) -> None:
-    own = 'lower="-2" upper="2" effort="45" velocity="15"'
-    files = translated(tmp_path, four_bar(knee=own))
+def test_the_limb_keeps_a_drive_of_its_own() -> None:
+    files = translated(four_bar(knee='lower="-2" upper="2" effort="45" velocity="15"'))
     assert files.drives["FL_knee"].torque == 45
-    words = notes(files, "closed loop 'FL_rod_end'")
-    assert "the drive of 'FL_crank_joint' is left out: 'FL_knee' has a drive of its own" in words[0]
+    told = notes(files, "closed loop 'FL_rod_end'")[0]
+    assert "the drive of 'FL_crank_joint' is left out: 'FL_knee' has a drive of its own" in told
+
+
+def test_a_drive_at_its_dead_centre_is_lost_with_a_word() -> None:
+    told = notes(translated(four_bar(crank=0.0)), "closed loop 'FL_rod_end'")[0]
+    assert "the drive of 'FL_crank_joint' is left out" in told
+    assert "`torque` FL_knee=VALUE" in told
 
 
 def jacobian_ratio(path: Path, crank: str, knee: str) -> float:
@@ -97,7 +82,7 @@ def jacobian_ratio(path: Path, crank: str, knee: str) -> float:
     return abs(float(moving[a] / moving[b]))
 
 
-def leg(lever: float, more: str = "") -> str:
+def leg(lever: float) -> str:
     """MJCF leg with a crank of 30 mm at the hip, whose rod ends on a lever of the shank."""
     return f"""<mujoco><option><flag gravity="disable"/></option><worldbody>
       <body name="thigh" pos="0 0 1"><geom size=".02"/>
@@ -105,7 +90,7 @@ def leg(lever: float, more: str = "") -> str:
         <body name="rod" pos="-.03 0 0"><joint name="rod" type="ball"/>
           <geom size=".01" pos="0 0 -.1"/></body></body>
       <body name="shank" pos="0 0 -.3"><joint name="knee" axis="0 1 0"/>
-        <geom size=".02" pos="0 0 -.3"/>{more}</body></body></worldbody>
+        <geom size=".02" pos="0 0 -.3"/></body></body></worldbody>
       <equality><connect name="link" body1="shank" body2="rod" anchor="-{lever} 0 0"/></equality>
       <actuator><motor joint="crank" ctrlrange="-10 10"/></actuator></mujoco>"""
 
@@ -116,15 +101,15 @@ def opened(path: Path) -> Description:
 
 
 @pytest.mark.parametrize("lever", [0.03, 0.05, 0.012])
-def test_the_torque_of_a_linkage_follows_from_its_levers(tmp_path: Path, lever: float) -> None:
-    path = written(tmp_path, leg(lever), "xml")
+def test_the_torque_of_a_linkage_follows_from_its_levers(lever: float) -> None:
+    path = written(leg(lever), "robot.xml")
     knee = opened(path).joints["knee"]
     assert knee.effort == pytest.approx(10 * jacobian_ratio(path, "crank", "knee"), rel=1e-3)
     assert knee.effort == pytest.approx(10 * lever / 0.03, rel=1e-3)
     assert knee.driven
 
 
-def test_two_cranks_drive_an_ankle_of_two_axes(tmp_path: Path) -> None:
+def test_two_cranks_drive_an_ankle_of_two_axes() -> None:
     """Both cranks move the foot up and down, and sideways where they move against each other."""
     cranks = "".join(
         f'<body name="crank{s}" pos="0 {y} .2"><joint name="crank{s}" axis="0 1 0"/>'
@@ -140,20 +125,13 @@ def test_two_cranks_drive_an_ankle_of_two_axes(tmp_path: Path) -> None:
       <connect body1="foot" body2="rodR" anchor="-.04 -.03 0"/></equality><actuator>
       <motor joint="crankL" ctrlrange="-10 10"/><motor joint="crankR" ctrlrange="-10 10"/>
       </actuator></mujoco>"""
-    joints = opened(written(tmp_path, text, "xml")).joints
+    joints = opened(written(text, "robot.xml")).joints
     # Two cranks of 10 N m with levers of 40 mm, on levers of 40 mm and 30 mm.
     assert joints["pitch"].effort == pytest.approx(20, rel=1e-3)
     assert joints["roll"].effort == pytest.approx(15, rel=1e-3)
 
 
-def test_a_drive_at_its_dead_centre_is_lost_with_a_word(tmp_path: Path) -> None:
-    files = translated(tmp_path, four_bar(crank=0.0))
-    words = notes(files, "closed loop 'FL_rod_end'")
-    assert "the drive of 'FL_crank_joint' is left out" in words[0]
-    assert "`torque` FL_knee=VALUE" in words[0]
-
-
-def test_bodies_beyond_a_held_joint_are_no_part_of_a_straight_rod(tmp_path: Path) -> None:
+def test_bodies_beyond_a_held_joint_are_no_part_of_a_straight_rod() -> None:
     """A shin and a tarsus that a spring's rod couples: knee and ankle are driven, tarsus is not."""
     lines = [link("torso", 10.0)]
     for side, y in (("left", 0.1), ("right", -0.1)):
@@ -172,7 +150,7 @@ def test_bodies_beyond_a_held_joint_are_no_part_of_a_straight_rod(tmp_path: Path
             lines.append(joint(f"{side}_{name}", parent, child, at, axis, f'{limit} velocity="9"'))
     text = '<robot name="bird">\n' + "\n".join(lines) + "\n</robot>\n"
     text = text.replace('velocity="20" velocity="9"', 'velocity="20"')
-    found = import_robot(written(tmp_path, text), tmp_path / "bird")
+    found = imported(text)
     design = found.spec.resolve()
     values = design.parameters
     assert values["shank_length"] == pytest.approx(np.hypot(0.2, 0.25), abs=1e-4)
@@ -182,10 +160,10 @@ def test_bodies_beyond_a_held_joint_are_no_part_of_a_straight_rod(tmp_path: Path
         "right_bar_end",
     ]
     assert design.accepted
-    assert "left_tarsus' at 0" in " ".join(map(str, found.notes))
+    assert notes(found, "left_tarsus' at 0")
 
 
-def test_the_drive_of_an_ankle_sits_where_its_crank_turns(tmp_path: Path) -> None:
+def test_the_drive_of_an_ankle_sits_where_its_crank_turns() -> None:
     """The ankle's own drive closes a loop with a crank at the top of the shank."""
     lines: list[str] = []
     for side, y in (("left", 0.1), ("right", -0.1)):
@@ -203,9 +181,11 @@ def test_the_drive_of_an_ankle_sits_where_its_crank_turns(tmp_path: Path) -> Non
             f'<body name="{side}_foot" pos="0 0 -.3"><joint name="{side}_ankle" axis="0 1 0"/>'
             '<geom type="box" size=".1 .03 .02" pos="0 0 -.04"/></body></body></body></body>',
         ]
-    joined = [f"{side}_{name}" for side in ("left", "right") for name in
-              ("hip", "pitch", "knee", "ankle")]  # fmt: skip
-    motors = "".join(f'<motor joint="{name}" ctrlrange="-60 60"/>' for name in joined)
+    motors = "".join(
+        f'<motor joint="{side}_{name}" ctrlrange="-60 60"/>'
+        for side in ("left", "right")
+        for name in ("hip", "pitch", "knee", "ankle")
+    )
     close = "".join(
         f'<connect body1="{side}_bar" body2="{side}_foot" anchor="0 0 -.25"/>'
         for side in ("left", "right")
@@ -215,7 +195,6 @@ def test_the_drive_of_an_ankle_sits_where_its_crank_turns(tmp_path: Path) -> Non
         f'<geom type="box" size=".1 .15 .2" pos="0 0 .1"/>{"".join(lines)}</body></worldbody>'
         f"<equality>{close}</equality><actuator>{motors}</actuator></mujoco>"
     )
-    found = import_robot(written(tmp_path, text, "xml"), tmp_path / "out")
-    tree = (tmp_path / "out" / "tree.yaml").read_text("utf-8")
-    assert "shift: [-0.02, 0, 0.25]" in tree
+    found = imported(text, "robot.xml")
+    assert "shift: [-0.02, 0, 0.25]" in Path("mine/tree.yaml").read_text("utf-8")
     assert found.spec.resolve().accepted

@@ -10,12 +10,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from draft.cli import main
 from draft.description.description import Description
 from draft.description.read import describe
 from draft.imports.mesh_masses import weighed
 from draft.imports.meshes import Meshes
 from draft.twins.compare import compare_twin
+from tests.commands import line, printed
+from tests.imports.written import written
 from tests.twins.test_vendors import ROBOTS
 
 # A prism whose base is an L, with its faces cut into triangles: no convex body.
@@ -49,24 +50,17 @@ def model(
 ) -> Path:
     """A quadruped whose trunk has these geoms, its mesh beside it."""
     if mesh:
-        Path("part.obj").write_text(prism(), encoding="utf-8")
-    path = Path("beast.xml")
-    path.write_text(
+        written(prism(), "part.obj")
+    return written(
         f'<mujoco><compiler {compiler}/><asset><mesh name="part" file="part.obj" {asset}/></asset>'
         f'<worldbody><body name="trunk" pos="0 0 .5"><freejoint/>{trunk}'
         f"{LEGS.format(thigh=thigh)}</body></worldbody></mujoco>",
-        encoding="utf-8",
+        "beast.xml",
     )
-    return path
 
 
 def read(path: Path) -> Description:
     return weighed(describe(path), Meshes(path.parent))
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 GIVEN: dict[str, tuple[str, str, str]] = {
@@ -124,58 +118,51 @@ def test_a_hand_that_only_meshes_weigh_weighs_what_mujoco_says(side: str) -> Non
     assert twin.vendor_mass == pytest.approx(float(theirs.body_mass.sum()), rel=1e-6)
 
 
-def test_a_stated_mass_needs_no_mesh(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_stated_mass_needs_no_mesh() -> None:
     path = model(SHAPE.format('mass="7"'), mesh=False)
     found = read(path)
     assert found.mass == pytest.approx(7 + 4 * 2.5)
     assert found.unplaced == {"trunk"}
-    assert main(["twin", str(path)]) == 0
-    out = " ".join(capsys.readouterr().out.split())
+    out = line(printed("twin", path))
     assert "only meshes that are not read say where the mass is of 'trunk'" in out
     assert "M(q): nothing to compare" in out
 
 
-def test_no_ratio_is_printed_against_a_part_of_the_mass(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    path = model(SHAPE.format("") + '<geom size=".01"/>', mesh=False)
+UNKNOWN = SHAPE.format("") + '<geom size=".01"/>'
+
+
+def test_no_ratio_is_printed_against_a_part_of_the_mass() -> None:
+    path = model(UNKNOWN, mesh=False)
     found = compare_twin(path, poses=2)
     assert found.unstated == ("trunk",)
     assert np.isnan(found.mass_ratio)
-    assert main(["twin", str(path)]) == 0
-    out = capsys.readouterr().out
+    out = printed("twin", path)
     assert "the maker's file states no mass for 1 link, 'trunk'" in out
-    lines = [line.split() for line in out.splitlines() if line.strip()]
-    rows = {line[0]: line for line in reversed(lines)}
+    lines = [words.split() for words in out.splitlines() if words.strip()]
+    rows = {words[0]: words for words in reversed(lines)}
     for name in ("trunk", "total"):
         assert rows[name][1] == "unknown"
         assert len(rows[name]) == 3
     assert float(rows["shank"][3]) > 0
     assert "the maker's is outside" not in out
-    assert main(["twin", str(path), "--json"]) == 0
-    record = json.loads(capsys.readouterr().out)
+    record = json.loads(printed("twin", path, "--json"))
     assert record["mass_kg"]["ratio"] is None
     assert record["mass_kg"]["vendor"] is None
     assert record["mass_kg"]["links_without_mass"] == ["trunk"]
     assert record["inertia_error_percent"]["median"] is None
 
 
-def test_a_robot_of_unknown_mass_does_not_count_among_many(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+@pytest.mark.slow
+def test_a_robot_of_unknown_mass_does_not_count_among_many_and_has_its_figure() -> None:
+    pytest.importorskip("matplotlib")
     Path("many").mkdir()
-    path = model(SHAPE.format("") + '<geom size=".01"/>', mesh=False)
-    shutil.move(path, "many/unknown.xml")
+    shutil.move(model(UNKNOWN, mesh=False), "many/unknown.xml")
     shutil.move(model('<geom size=".12"/>', mesh=False), "many/known.xml")
-    assert main(["twin", "--all", "many", "--json", "--workers", "1"]) == 0
-    robots = {row["robot"]: row for row in json.loads(capsys.readouterr().out)["robots"]}
+    all_of_them = ("twin", "--all", "many", "--workers", "1", "--poses", "5")
+    record = json.loads(printed(*all_of_them, "--json", progress=True))
+    robots = {row["robot"]: row for row in record["robots"]}
     assert robots["unknown"]["ratio"] is None
     assert robots["known"]["ratio"] > 0
-    assert main(["twin", "--all", "many", "--workers", "1", "--out", "figures"]) == 0
-
-
-def test_a_figure_of_a_twin_without_known_masses_is_drawn() -> None:
-    pytest.importorskip("matplotlib")
-    path = model(SHAPE.format("") + '<geom size=".01"/>', mesh=False)
-    assert main(["twin", str(path), "--out", "figures"]) == 0
-    assert Path("figures/beast.pdf").is_file()
+    printed(*all_of_them, "--out", "figures", progress=True)
+    printed("twin", "many/unknown.xml", "--poses", "5", "--out", "figures", progress=True)
+    assert Path("figures/unknown.pdf").is_file()

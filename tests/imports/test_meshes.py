@@ -10,11 +10,11 @@ import pytest
 
 from draft.description import mesh_paths
 from draft.imports import units
-from draft.imports.importer import Files, translate
+from draft.imports.importer import Files
 from draft.imports.mesh_files import read_mesh
 from draft.values import Array
 from tests.imports.test_collada import dae, shape
-from tests.imports.written import CUBE, link, quadruped
+from tests.imports.written import CUBE, bolt, link, notes, quadruped, translated, written
 
 
 def scaled(factor: float) -> str:
@@ -73,6 +73,38 @@ def test_an_obj_square_is_two_triangles_however_it_is_written(name: str) -> None
     assert turned == square
 
 
+FACE = "a face is not the numbers of three points or more"
+BAD: dict[str, tuple[str, str | bytes, str]] = {
+    "a point that is not there": (".obj", "\nf 1 2 9", "it names a point that is not there"),
+    "a point before the first": (".obj", "\nf -1 -2 -9", FACE),
+    "a point zero": (".obj", "\nf 1 2 0", FACE),
+    "half a point": (".obj", "\nf 1 2 2.5", FACE),
+    "a point in a plane": (".obj", "\nv 1 2\nf 1 2 3", "its numbers do not fit together"),
+    "an empty OBJ": (".obj", b"", "it is not an OBJ file"),
+    "an empty STL": (".stl", b"", "it is not an STL file"),
+    "an STL of nothing": (".stl", bytes(84), "it has no finite triangles"),
+    "an STL that is cut": (".stl", bytes(97), "its header says 0 triangles, it holds 0"),
+    "an STL whose header lies": (
+        ".stl",
+        binary(np.zeros((7, 3, 3)), 2**32 - 1),
+        "its header says 4294967295 triangles, it holds 7",
+    ),
+    "a text STL that is cut": (
+        ".stl",
+        b"solid x\nvertex 0 0 0\nvertex 1 0 0\n",
+        "its text is cut short",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_file_is_refused(name: str) -> None:
+    kind, data, words = BAD[name]
+    whole = (CUBE + data).encode() if isinstance(data, str) else data
+    with pytest.raises(ValueError, match=f"^{words}"):
+        read_mesh(whole, kind)
+
+
 CROWDED: dict[str, tuple[str, bytes, str]] = {
     # Each would have trimesh make very many meshes, or a mesh of very many triangles.
     "corners of faces": (".obj", (POINTS + "f" + " 1" * 3_000_001).encode(), "1000000 triangles"),
@@ -115,11 +147,9 @@ def test_names_of_other_files_are_taken_out(monkeypatch: pytest.MonkeyPatch) -> 
     assert not any("secret" in text for text in seen)
 
 
-def imported(folder: Path, mesh: str, more: str = "") -> Files:
+def made(mesh: str, more: str = "") -> Files:
     """What comes of a quadruped with a mesh on its trunk."""
-    path = folder / "beast.urdf"
-    path.write_text(quadruped(more, mesh=mesh), encoding="utf-8")
-    return translate(path, "beast", shown="beast.urdf")
+    return translated(quadruped(more, mesh=mesh))
 
 
 def trunk(files: Files) -> str:
@@ -143,36 +173,34 @@ SIZES: dict[str, tuple[float, str, str, str]] = {
 
 
 @pytest.mark.parametrize("name", SIZES)
-def test_a_mesh_in_other_units_is_put_right_or_left_out(name: str, tmp_path: Path) -> None:
+def test_a_mesh_in_other_units_is_put_right_or_left_out(name: str) -> None:
     factor, scale, length, words = SIZES[name]
-    (tmp_path / "b.obj").write_text(scaled(factor), encoding="utf-8")
-    files = imported(tmp_path, f'b.obj" scale="{scale} {scale} {scale}')
+    written(scaled(factor), "b.obj")
+    files = made(f'b.obj" scale="{scale} {scale} {scale}')
     assert trunk(files) == length
-    notes = [str(note) for note in files.reduced.notes]
-    assert bool(notes) == bool(words)
-    assert not words or any(note.startswith("beast.urdf:2: ") and words in note for note in notes)
+    assert bool(notes(files)) == bool(words)
+    assert not words or any(one.startswith("beast.urdf:2: ") for one in notes(files, words))
 
 
 def shaped(name: str, mesh: str) -> str:
     """A bolted link of the trunk with a mesh."""
-    ends = f'<parent link="body"/><child link="{name}"/>'
-    return link(name, 1.0, mesh) + f'<joint name="{name}_bolt" type="fixed">{ends}</joint>'
+    return link(name, 1.0, mesh) + bolt(f"{name}_bolt", "body", name)
 
 
-def test_a_mesh_in_metres_beside_one_in_millimetres_stays_as_it_is(tmp_path: Path) -> None:
-    (tmp_path / "mm.obj").write_text(scaled(1000), encoding="utf-8")
-    (tmp_path / "m.obj").write_text(scaled(0.3), encoding="utf-8")
-    files = imported(tmp_path, "mm.obj", shaped("camera", "m.obj"))
+# Sizes of the trunk's mesh and of a part's beside it, and the lines of those that are put right.
+BESIDE = {"a part in metres": (1000, 0.3, [2]), "a small part in millimetres": (1000, 5, [2, 35])}
+
+
+@pytest.mark.parametrize("name", BESIDE)
+def test_a_mesh_beside_one_in_millimetres_is_put_right_if_it_is_longer_than_the_robot(
+    name: str,
+) -> None:
+    large, small, lines = BESIDE[name]
+    written(scaled(large), "large.obj")
+    written(scaled(small), "small.obj")
+    files = made("large.obj", shaped("camera", "small.obj"))
     assert trunk(files) == "0.6"
-    assert [note.where.line for note in files.reduced.notes if note.where] == [2]
-
-
-def test_small_parts_in_millimetres_go_with_the_large_ones(tmp_path: Path) -> None:
-    (tmp_path / "large.obj").write_text(scaled(1000), encoding="utf-8")
-    (tmp_path / "small.obj").write_text(scaled(5), encoding="utf-8")  # 3 m, or 3 mm
-    files = imported(tmp_path, "large.obj", shaped("logo", "small.obj"))
-    assert trunk(files) == "0.6"
-    assert len(files.reduced.notes) == 2
+    assert [note.where.line for note in files.reduced.notes if note.where] == lines
 
 
 def test_a_small_part_in_metres_is_left_alone() -> None:
@@ -180,101 +208,88 @@ def test_a_small_part_in_metres_is_left_alone() -> None:
     assert units.factors([0.6, 0.0003], [(1, 1, 1), (0.001,) * 3], 0.7, 0.4, set()) == [1, 1000]
     assert units.factors([600.0], [(1, 1, 1)], 0.0, 0.0, set()) == [1]
     assert units.factors([], [], 0.7, 0.4, set()) == []
+    assert units.factors([2.0], [(1, 1, 1)], 0.7, 0.4, set()) == [1]  # Of no scale that is known.
 
 
-def test_a_collada_file_counts_for_the_trunk(tmp_path: Path) -> None:
+def test_a_collada_file_counts_for_the_trunk() -> None:
     ring = shape("polygons", "<p>0 1 2 3</p><p>4 5 6 7</p><p>0 1 5 4</p><p>2 3 7 6</p>")
     corners = [
         f"{x} {y} {z}" for z in (-5, 5) for x, y in ((-30, -10), (30, -10), (30, 10), (-30, 10))
     ]
     data = dae(ring, unit='<unit name="centimeter" meter="0.01"/>', points=" ".join(corners))
-    (tmp_path / "b.dae").write_bytes(data)
-    files = imported(tmp_path, "b.dae")
+    Path("b.dae").write_bytes(data)
+    files = made("b.dae")
     assert trunk(files) == "0.6"
     assert not files.reduced.notes
 
 
-# Where the description stands, what other files there are, the mesh's name, and where it is found.
-PLACES: dict[str, tuple[str, tuple[str, ...], str, str | None]] = {
-    "beside it": ("r", ("r/a.stl",), "a.stl", "r/a.stl"),
-    "below it": ("r", ("r/meshes/a.stl",), "./meshes//a.stl", "r/meshes/a.stl"),
-    "backslashes": ("r", ("r/meshes/a.stl",), "meshes\\a.stl", "r/meshes/a.stl"),
-    "spaces": ("r", ("r/my meshes/a b.stl",), "my meshes/a b.stl", "r/my meshes/a b.stl"),
-    "above urdf": ("r/urdf", ("r/meshes/a.stl",), "../meshes/a.stl", "r/meshes/a.stl"),
-    "above another": ("r/stuff", ("r/meshes/a.stl",), "../meshes/a.stl", "r/meshes/a.stl"),
-    "above another, of another name": ("r/stuff", ("r/other/a.stl",), "../other/a.stl", None),
-    "a deep prefix": (
-        "r/urdf",
-        ("r/meshes/a.stl",),
-        "package://vendor/robots/v2/r/meshes/a.stl",
-        "r/meshes/a.stl",
-    ),
+MANIFEST = "r/package.xml"
+# Where the description stands, what files there are, the mesh's name, and whether it is the first.
+PLACES: dict[str, tuple[str, tuple[str, ...], str, bool]] = {
+    "beside it": ("r", ("r/a.stl",), "a.stl", True),
+    "below it": ("r", ("r/meshes/a.stl",), "./meshes//a.stl", True),
+    "backslashes": ("r", ("r/meshes/a.stl",), "meshes\\a.stl", True),
+    "spaces": ("r", ("r/my meshes/a b.stl",), "my meshes/a b.stl", True),
+    "above urdf": ("r/urdf", ("r/meshes/a.stl",), "../meshes/a.stl", True),
+    "above another": ("r/stuff", ("r/meshes/a.stl",), "../meshes/a.stl", True),
+    "above another, of another name": ("r/stuff", ("r/other/a.stl",), "../other/a.stl", False),
+    "a deep prefix": ("r/urdf", ("r/meshes/a.stl",), "package://v/robots/2/r/meshes/a.stl", True),
     "a deep prefix beside it": (
         "r",
         ("r/meshes/visual/a.stl",),
         "package://vendor/models/r/meshes/visual/a.stl",
-        "r/meshes/visual/a.stl",
+        True,
     ),
-    "another case of the extension": ("r", ("r/meshes/a.STL",), "meshes/a.stl", "r/meshes/a.STL"),
+    "another case of the extension": ("r", ("r/meshes/a.STL",), "meshes/a.stl", True),
     "another folder of meshes": (
         "r/urdf",
         ("r/meshes/v1/a.stl",),
         "package://r/meshes/a.stl",
-        "r/meshes/v1/a.stl",
+        True,
     ),
     "the folder most like the name": (
         "r/urdf",
-        ("r/meshes/v1/a.stl", "r/meshes/v2/a.stl"),
+        ("r/meshes/v2/a.stl", "r/meshes/v1/a.stl"),
         "package://r/mesh/v2/a.stl",
-        "r/meshes/v2/a.stl",
+        True,
     ),
-    "package": ("r/urdf", ("r/meshes/a.stl",), "package://r/meshes/a.stl", "r/meshes/a.stl"),
-    "package of another name": (
-        "r/urdf",
-        ("r/meshes/a.stl",),
-        "package://vendor/meshes/a.stl",
-        "r/meshes/a.stl",
-    ),
-    "package without a name": ("r/urdf", ("r/m/a.stl",), "package://m/a.stl", "r/m/a.stl"),
-    "model": ("r/urdf", ("r/meshes/a.stl",), "model://r/meshes/a.stl", "r/meshes/a.stl"),
-    "a package.xml far above": (
-        "r/a/b/c/d",
-        ("r/package.xml", "r/m/a.stl"),
-        "package://r/m/a.stl",
-        "r/m/a.stl",
-    ),
+    "package": ("r/urdf", ("r/meshes/a.stl",), "package://r/meshes/a.stl", True),
+    "package of another name": ("r/urdf", ("r/meshes/a.stl",), "package://v/meshes/a.stl", True),
+    "package without a name": ("r/urdf", ("r/m/a.stl",), "package://m/a.stl", True),
+    "model": ("r/urdf", ("r/meshes/a.stl",), "model://r/meshes/a.stl", True),
+    "a package.xml far above": ("r/a/b/c/d", ("r/m/a.stl", MANIFEST), "package://r/m/a.stl", True),
     "a package.xml too far above": (
         "r/a/b/c/d/e",
-        ("r/package.xml", "r/m/a.stl"),
+        ("r/m/a.stl", MANIFEST),
         "../../../../../m/a.stl",
-        None,
+        False,
     ),
     "the nearest package.xml": (
         "r/p/urdf",
-        ("r/package.xml", "r/p/package.xml", "r/a.stl"),
+        ("r/a.stl", MANIFEST, "r/p/package.xml"),
         "../../a.stl",
-        None,
+        False,
     ),
-    "file inside": ("r", ("r/a.stl",), "file://{top}/r/a.stl", "r/a.stl"),
-    "an absolute path inside": ("r", ("r/a.stl",), "{top}/r/a.stl", "r/a.stl"),
-    "file outside": ("r", ("a.stl",), "file://{top}/a.stl", None),
-    "an absolute path outside": ("r", ("a.stl",), "{top}/a.stl", None),
-    "a path outside": ("r", ("a.stl",), "../a.stl", None),
-    "a package's path outside": ("r", ("a.stl",), "package://r/../../a.stl", None),
+    "file inside": ("r", ("r/a.stl",), "file://{top}/r/a.stl", True),
+    "an absolute path inside": ("r", ("r/a.stl",), "{top}/r/a.stl", True),
+    "file outside": ("r", ("a.stl",), "file://{top}/a.stl", False),
+    "an absolute path outside": ("r", ("a.stl",), "{top}/a.stl", False),
+    "a path outside": ("r", ("a.stl",), "../a.stl", False),
+    "a package's path outside": ("r", ("a.stl",), "package://r/../../a.stl", False),
 }
 
 
 @pytest.mark.parametrize("name", PLACES)
 def test_a_mesh_is_found_inside_its_package_only(name: str, tmp_path: Path) -> None:
-    stands, files, mesh, expected = PLACES[name]
+    stands, files, mesh, inside = PLACES[name]
     top = Path(os.path.realpath(tmp_path))
     (top / stands).mkdir(parents=True)
     for file in files:
         (top / file).parent.mkdir(parents=True, exist_ok=True)
         (top / file).touch()
     found, outside = mesh_paths.find(mesh.format(top=top), top / stands)
-    assert found == (top / expected if expected else None)
-    assert outside == (expected is None)
+    assert found == (top / files[0] if inside else None)
+    assert outside == (not inside)
 
 
 def test_of_two_files_that_a_name_may_mean_none_is_taken(tmp_path: Path) -> None:
@@ -302,8 +317,8 @@ def test_a_link_that_leads_outside_finds_nothing(tmp_path: Path) -> None:
     assert found.name == "c.stl"
 
 
-def test_a_file_under_two_names_is_read_once(tmp_path: Path) -> None:
-    (tmp_path / "b.obj").write_text(CUBE, encoding="utf-8")
-    (tmp_path / "c.obj").symlink_to("b.obj")
-    files = imported(tmp_path, "b.obj", shaped("camera", "./c.obj"))
+def test_a_file_under_two_names_is_read_once() -> None:
+    written(CUBE, "b.obj")
+    Path("c.obj").symlink_to("b.obj")
+    files = made("b.obj", shaped("camera", "./c.obj"))
     assert files.reduced.counts["meshes read for their size"] == 1

@@ -13,24 +13,26 @@ import pytest
 
 from draft.description.read import describe
 from draft.description.xmlfile import DescriptionError
-from draft.imports.importer import Imported, import_robot
+from draft.imports.importer import Imported
+from draft.spec import Spec
 from draft.twins.vendor import vendor_model
-from tests.imports.written import LEGS, joint, link, quadruped
+from tests.imports.written import LEGS, imported, joint, link, notes, quadruped, written
 from tests.twins.test_vendors import misplaced
 
 STROKE = 'lower="0" upper="0.12" effort="2500" velocity="0.5"'
 DRIVES = "drives of prismatic joints"
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in a folder of one's own."""
-    monkeypatch.chdir(tmp_path)
+def kinds(spec: Spec) -> dict[str, str | None]:
+    """Structural class of each body with a member."""
+    found = {body.name: body.link.member for body in spec.bodies}
+    return {name: member.fields.segment for name, member in found.items() if member is not None}
 
 
-def imported(text: str, file: str = "beast.urdf") -> Imported:
-    Path(file).write_text(text, encoding="utf-8")
-    return import_robot(Path(file), Path("mine"))
+def stands(found: Imported) -> bool:
+    """Whether hinges and slides are where the vendor has them."""
+    gap, angle = misplaced(found, describe(Path("beast.urdf")))
+    return gap < 1e-4 and angle < 1e-3
 
 
 def telescopic(
@@ -43,11 +45,8 @@ def telescopic(
         way = axis if y > 0 else axis.replace("0 1 0", "0 -1 0")
         slide = joint(f"{leg}_piston", part, rod, (0, 0, at), way, STROKE, "prismatic")
         text = text.replace(f'parent link="{part}"', f'parent link="{rod}"')
-        text = (
-            text.replace('xyz="0 0 -0.22"', f'xyz="0 0 {-0.22 - at:g}"')
-            if name == "thigh"
-            else text
-        )
+        if name == "thigh":
+            text = text.replace('xyz="0 0 -0.22"', f'xyz="0 0 {-0.22 - at:g}"')
         text = text.replace("</robot>", link(rod) + "\n" + slide + "\n</robot>")
     return text.replace('xyz="0 0 -0.21"', f'xyz="0 0 {foot:g}"')
 
@@ -60,32 +59,22 @@ def test_a_slide_in_a_shank_is_part_of_it() -> None:
     assert len(pistons) == 4
     assert all(one.slide and one.actuator is None for one in pistons.values())
     assert all(one.range == (0.0, 0.12) for one in pistons.values())
-    kinds = {body.name: body.link.member for body in found.spec.bodies}
-    for name in ("FL_calf", "FL_rod"):
-        member = kinds[name]
-        assert member is not None
-        assert member.fields.segment == "shank"
-    text = (found.folder / "tree.yaml").read_text(encoding="utf-8")
+    own = kinds(found.spec)
+    assert (own["FL_calf"], own["FL_rod"]) == ("shank", "shank")
+    text = Path("mine/tree.yaml").read_text(encoding="utf-8")
     assert text.count("chain: leg") == 4
     assert "segment: thigh" in text
     assert set(found.spec.actuators) == {"knee_drive", "abduction_flexion_drive"}
-
-
-def test_hinges_and_slides_stand_where_the_vendors_do() -> None:
-    found = imported(telescopic())
-    gap, angle = misplaced(found, describe(Path("beast.urdf")))
-    assert gap < 1e-4
-    assert angle < 1e-3
+    assert stands(found)
 
 
 def test_the_drive_is_left_out_counted_and_named() -> None:
     found = imported(telescopic())
     assert found.ignored[DRIVES] == 4
-    notes = [str(note) for note in found.notes if "prismatic" in str(note)]
-    assert len(notes) == 1
-    assert all(f"'{leg}_piston'" in notes[0] for leg in ("FL", "FR", "RL", "RR"))
-    assert notes[0].startswith("beast.urdf:37: prismatic joint 'FL_piston' is kept without its")
-    assert "this one weighs nothing" in notes[0]
+    (told,) = notes(found, "prismatic")
+    assert all(f"'{leg}_piston'" in told for leg in LEGS)
+    assert told.startswith("beast.urdf:37: prismatic joint 'FL_piston' is kept without its")
+    assert "this one weighs nothing" in told
     report = json.loads((found.folder / "import.json").read_text(encoding="utf-8"))
     assert report["ignored"][DRIVES] == 4
     assert report["joints"]["RR_piston"] == "RR_piston"
@@ -93,25 +82,20 @@ def test_the_drive_is_left_out_counted_and_named() -> None:
 
 def test_a_slide_in_a_thigh_leaves_hip_and_knee_what_they_are() -> None:
     found = imported(telescopic(name="thigh", foot=-0.21))
-    design = found.spec.resolve()
     assert found.spec.population == "quadruped"
-    bodies = {body.name: body for body in found.spec.bodies}
-    for name, kind in (("FL_thigh", "thigh"), ("FL_rod", "thigh"), ("FL_calf", "shank")):
-        member = bodies[name].link.member
-        assert member is not None
-        assert member.fields.segment == kind
+    own = kinds(found.spec)
+    assert (own["FL_thigh"], own["FL_rod"], own["FL_calf"]) == ("thigh", "thigh", "shank")
     # A drive at the hip cannot reach a knee that slides away from it.
-    assert bodies["FL_rod"].link.motor is not None
-    gap, _ = misplaced(found, describe(Path("beast.urdf")))
-    assert gap < 1e-4
-    assert design.build().mujoco.njnt == 17
+    rod = next(body for body in found.spec.bodies if body.name == "FL_rod")
+    assert rod.link.motor is not None
+    assert stands(found)
+    assert found.spec.resolve().build().mujoco.njnt == 17
 
 
 @pytest.mark.parametrize("name", ["thigh", "calf"])
 def test_mirrored_legs_share_a_chain_whichever_way_their_slides_point(name: str) -> None:
     found = imported(telescopic(axis="0 1 0", name=name))
-    text = (found.folder / "tree.yaml").read_text(encoding="utf-8")
-    assert text.count("chain: leg") == 4
+    assert Path("mine/tree.yaml").read_text(encoding="utf-8").count("chain: leg") == 4
     model = found.spec.resolve().build().mujoco
     assert model.joint("FL_piston").axis == pytest.approx([0, 1, 0])
     assert model.joint("FR_piston").axis == pytest.approx([0, -1, 0])
@@ -148,9 +132,8 @@ def test_a_slide_at_its_knee_divides_the_way_to_the_foot() -> None:
 
 
 def test_a_slide_with_no_member_to_divide_is_an_error_with_its_line() -> None:
-    Path("beast.urdf").write_text(telescopic(at=-0.01, foot=-0.02), encoding="utf-8")
     with pytest.raises(DescriptionError) as caught:
-        import_robot(Path("beast.urdf"), Path("mine"))
+        imported(telescopic(at=-0.01, foot=-0.02))
     words = "beast.urdf:37: prismatic joint 'FL_piston' begins where the joint above it does"
     assert str(caught.value).startswith(words)
     assert not Path("mine").exists()
@@ -164,11 +147,14 @@ def test_a_slide_on_the_trunk_carries_what_hangs_on_it() -> None:
     model = found.spec.resolve().build().mujoco
     assert model.joint("rail").axis == pytest.approx([1, 0, 0])
     assert model.njnt == 16
-    member = next(body.link.member for body in found.spec.bodies if body.name == "sled")
-    assert member is not None
-    assert member.fields.segment == "other"
-    gap, _ = misplaced(found, describe(Path("beast.urdf")))
-    assert gap < 1e-4
+    assert kinds(found.spec)["sled"] == "other"
+    assert stands(found)
+
+
+def on_body(name: str, limit: str) -> Imported:
+    """The quadruped with a slide on its trunk."""
+    slide = joint(name, "body", "rod", (0, 0, 0.1), "0 0 1", limit, "prismatic")
+    return imported(quadruped(link("rod") + slide))
 
 
 @pytest.mark.parametrize(
@@ -182,12 +168,11 @@ def test_a_slide_on_the_trunk_carries_what_hangs_on_it() -> None:
     ],
 )
 def test_a_stroke_that_cannot_be_is_held_at_zero_and_named(limit: str, said: str) -> None:
-    rod = link("rod") + joint("slide", "body", "rod", (0, 0, 0.1), "0 0 1", limit, "prismatic")
-    found = imported(quadruped(rod))
+    found = on_body("slide", limit)
     assert found.ignored["prismatic joints"] == 1
     assert "slide" not in found.joints
     words = f"beast.urdf:35: prismatic joint 'slide' has {said}: it is held at zero"
-    assert any(str(note).startswith(words) for note in found.notes)
+    assert any(note.startswith(words) for note in notes(found))
 
 
 def test_a_slide_of_an_mjcf_without_a_range_is_held() -> None:
@@ -201,8 +186,7 @@ def test_a_slide_of_an_mjcf_without_a_range_is_held() -> None:
     </actuator></mujoco>"""
     found = imported(text.replace("RANGE", 'range="-0.05 0.05"'), "hopper.xml")
     assert found.spec.resolve().joints["rod"].range == (-0.05, 0.05)
-    Path("free.xml").write_text(text.replace("RANGE", ""), encoding="utf-8")
-    free = import_robot(Path("free.xml"), Path("free"))
+    free = imported(text.replace("RANGE", ""), "free.xml", "free")
     assert free.ignored["prismatic joints"] == 1
     assert "free.xml:5: prismatic joint 'rod' has no range: it is held" in str(free.notes[0])
 
@@ -216,16 +200,14 @@ def test_a_slide_of_an_mjcf_without_a_range_is_held() -> None:
     ],
 )
 def test_slides_of_grippers_and_without_effort_stay_held(name: str, limit: str, kind: str) -> None:
-    rod = link("rod") + joint(name, "body", "rod", (0, 0, 0.1), "0 0 1", limit, "prismatic")
-    found = imported(quadruped(rod))
+    found = on_body(name, limit)
     assert found.ignored[kind] == 1
     assert DRIVES not in found.ignored
     assert name not in found.joints
 
 
 def test_the_vendors_own_model_slides_too() -> None:
-    Path("beast.urdf").write_text(telescopic(), encoding="utf-8")
-    model = vendor_model(describe(Path("beast.urdf")), ["FL_knee", "FL_piston"])
+    model = vendor_model(describe(written(telescopic())), ["FL_knee", "FL_piston"])
     assert model.joint("FL_piston").type[0] == mujoco.mjtJoint.mjJNT_SLIDE
     assert model.joint("FL_knee").type[0] == mujoco.mjtJoint.mjJNT_HINGE
 

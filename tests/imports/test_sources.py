@@ -12,26 +12,16 @@ from typing import Any
 
 import pytest
 
-from draft.__main__ import main
 from draft.errors import DraftError
 from draft.extras import remedy
 from draft.imports.importer import import_robot
 from draft.imports.sources import find_source
+from tests.commands import refusal
 from tests.imports.written import quadruped
 
-
-@pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
-def installed(package: str) -> bool:
-    """Whether a distribution is installed."""
-    return any(True for _ in metadata.distributions(name=package))
-
-
 with_data = pytest.mark.skipif(
-    not installed("example-robot-data"), reason="example-robot-data is not installed"
+    not any(metadata.distributions(name="example-robot-data")),
+    reason="example-robot-data is not installed",
 )
 
 
@@ -60,32 +50,30 @@ def test_a_folder_or_a_file_of_example_robot_data_is_a_name(name: str, file: str
 
 
 @with_data
-def test_a_name_that_a_package_lacks_is_met_with_the_nearest(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert main(["import", "example-robot-data:anymal_d"]) == 2
-    words = "error: example-robot-data has no robot 'anymal_d'\n  did you mean 'anymal_"
-    assert capsys.readouterr().err.startswith(words)
+def test_a_name_that_a_package_lacks_is_met_with_the_nearest() -> None:
+    words = "example-robot-data has no robot 'anymal_d'\n  did you mean 'anymal_"
+    assert refusal("import", "example-robot-data:anymal_d").startswith(words)
 
 
+@pytest.mark.parametrize(
+    ("file", "package"),
+    [
+        ("example-robot-data:anymal_c", "example-robot-data"),
+        ("menagerie:unitree_go2", "mujoco_menagerie"),
+        ("robot_descriptions:go2_description", "robot_descriptions"),
+        ("r.urdf.xacro", "xacrodoc"),
+    ],
+)
 def test_a_package_that_is_not_installed_is_named_with_the_remedy(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    file: str, package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def missing(name: str) -> metadata.Distribution:
         raise metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr(metadata, "distribution", missing)
-    for package in ("mujoco_menagerie", "robot_descriptions", "xacrodoc"):
-        monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.setitem(sys.modules, package, None)
     Path("r.urdf.xacro").write_text("<robot/>")
-    for file, words in {
-        "example-robot-data:anymal_c": "example-robot-data is not installed",
-        "menagerie:unitree_go2": "mujoco_menagerie is not installed",
-        "robot_descriptions:go2_description": "robot_descriptions is not installed",
-        "r.urdf.xacro": "xacrodoc is not installed",
-    }.items():
-        assert main(["import", file]) == 2
-        assert capsys.readouterr().err == f"error: {words}\n  {remedy('robots')}\n"
+    assert refusal("import", file) == f"{package} is not installed\n  {remedy('robots')}\n"
 
 
 class Menagerie(ModuleType):
@@ -110,15 +98,13 @@ class Menagerie(ModuleType):
         return self.file
 
 
-def test_without_a_network_one_line_says_so(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+NETWORK = "  is there a network? or import a file of that robot by its path\n"
+
+
+def test_without_a_network_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mujoco_menagerie", Menagerie(None))
-    assert main(["import", "menagerie:unitree_go2"]) == 2
-    assert capsys.readouterr().err == (
-        "error: cannot download menagerie:unitree_go2: <urlopen error [Errno -2] Name or service "
-        "not known>\n  is there a network? or import a file of that robot by its path\n"
-    )
+    words = "menagerie:unitree_go2: <urlopen error [Errno -2] Name or service not known>\n"
+    assert refusal("import", "menagerie:unitree_go2") == f"cannot download {words}{NETWORK}"
 
 
 def test_the_model_of_the_menagerie_is_taken_without_its_scene(
@@ -157,27 +143,26 @@ def test_a_clone_in_the_cache_of_robot_descriptions_needs_no_network(
     monkeypatch.delitem(sys.modules, "robot_descriptions.go2_description", raising=False)
 
 
+CLONING = "Cloning https://example.org/go2.git...\n"
+
+
 def test_a_module_of_robot_descriptions_that_cannot_clone_is_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pytest.importorskip("robot_descriptions")
     plain = importlib.import_module
 
     def offline(name: str, *rest: Any) -> ModuleType:
         if name == "robot_descriptions.go2_description":
-            print("Cloning https://example.org/go2.git...")
+            print(CLONING, end="")
             print("0it [00:00, ?it/s]", end="", file=sys.stderr)
             raise RuntimeError("git\n  stderr: 'fatal: unable to access the repository'")
         return plain(name, *rest)
 
     monkeypatch.setattr(importlib, "import_module", offline)
-    assert main(["import", "robot_descriptions:go2_description"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err == (
-        "Cloning https://example.org/go2.git...\n"
-        "error: cannot download robot_descriptions:go2_description: fatal: unable to access the "
-        "repository\n  is there a network? or import a file of that robot by its path\n"
+    words = "robot_descriptions:go2_description: fatal: unable to access the repository\n"
+    assert refusal("import", "robot_descriptions:go2_description", first=CLONING) == (
+        f"cannot download {words}{NETWORK}"
     )
     with pytest.raises(DraftError, match="robot_descriptions has no robot 'os'"):
         find_source("robot_descriptions:os")
@@ -204,17 +189,15 @@ def test_a_xacro_is_expanded() -> None:
     assert found.geometry.joints == 12
 
 
-def test_a_xacro_that_cannot_be_expanded_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_xacro_that_cannot_be_expanded_is_one_line() -> None:
     pytest.importorskip("xacrodoc")
     Path("bad.xacro").write_text(
         '<robot xmlns:xacro="http://www.ros.org/wiki/xacro">\n<link name="${nothing}"/></robot>'
     )
-    assert main(["import", "bad.xacro"]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith("error: bad.xacro: the xacro cannot be expanded: ")
-    assert "xacro FILE > robot.urdf" in err
-    assert main(["import", "gone.xacro"]) == 2
-    assert capsys.readouterr().err == "error: gone.xacro: file not found\n"
+    error = refusal("import", "bad.xacro")
+    assert error.startswith("bad.xacro: the xacro cannot be expanded: ")
+    assert "xacro FILE > robot.urdf" in error
+    assert refusal("import", "gone.xacro") == "gone.xacro: file not found\n"
 
 
 def test_no_package_of_robots_is_imported_for_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -222,11 +205,8 @@ def test_no_package_of_robots_is_imported_for_a_file(monkeypatch: pytest.MonkeyP
     plain = builtins.__import__
 
     def watched(name: str, *rest: Any) -> ModuleType:
-        assert name.split(".", maxsplit=1)[0] not in (
-            "mujoco_menagerie",
-            "robot_descriptions",
-            "xacrodoc",
-        )
+        packages = ("mujoco_menagerie", "robot_descriptions", "xacrodoc")
+        assert name.split(".", maxsplit=1)[0] not in packages
         return plain(name, *rest)
 
     monkeypatch.setattr(builtins, "__import__", watched)

@@ -9,17 +9,18 @@ from pathlib import Path
 import pytest
 
 import draft
-from draft.cli import main
 from draft.design.widened import mass_with_band
 from draft.imports.expected import ExpectedMass, expected_mass, overload
 from draft.imports.importer import import_robot
 from draft.imports.options import Options
 from draft.imports.stated import Stated
 from draft.laws.beyond import beyond
+from tests.commands import line, printed
 from tests.imports.biped import TORQUES, biped
-from tests.imports.written import joint, link, quadruped
+from tests.imports.written import imported, joint, link, quadruped, written
 from tests.twins.test_vendors import ROBOTS
 
+NONE = dict.fromkeys(TORQUES, None)
 # An arm of three hinges that reaches up.
 ARM = "\n".join(
     [
@@ -33,20 +34,13 @@ ARM = "\n".join(
 )
 
 
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def said(text: str, *options: str) -> str:
+    written(text)
+    return line(printed("import", "beast.urdf", "--out", "mine", *options))
 
 
-def said(text: str, capsys: pytest.CaptureFixture[str], *options: str) -> str:
-    Path("walker.urdf").write_text(text, encoding="utf-8")
-    assert main(["import", "walker.urdf", "--out", "mine", *options]) == 0
-    return " ".join(capsys.readouterr().out.split())
-
-
-def expected(text: str, name: str, population: str | None = None) -> ExpectedMass:
-    Path("walker.urdf").write_text(text, encoding="utf-8")
-    found = import_robot("walker.urdf", name, population=population)
+def expected(text: str, name: str = "mine", population: str | None = None) -> ExpectedMass:
+    found = import_robot(written(text), name, population=population)
     return expected_mass(found.spec.resolve(), found.files)
 
 
@@ -54,35 +48,45 @@ def width(mass: ExpectedMass) -> float:
     return mass.high / mass.low
 
 
-def test_the_summary_of_a_sound_file(capsys: pytest.CaptureFixture[str]) -> None:
-    out = said(biped(), capsys)
-    assert "population: humanoid: two limbs reach the ground" in out
-    assert "joints: 16 driven hinges" in out
-    assert "left and right: equal" in out
-    assert "torques: 16 declared" in out
-    assert "trunk: from the box with its inertia" in out
-    assert "expected mass: " in out
-    assert "wider than" not in out
+SUMMARY = {
+    "a sound file": (
+        biped(),
+        (),
+        "population: humanoid: two limbs reach the ground",
+        "joints: 16 driven hinges",
+        "left and right: equal",
+        "torques: 16 declared",
+        "trunk: from the box with its inertia",
+        "expected mass: ",
+    ),
+    "guesses": (
+        biped({"ankle": 1000.0, "elbow": None}, right_thigh=0.2529),
+        (),
+        "torques: 12 declared, 2 replaced (implausible), 2 assumed (none in the file)",
+        "1 dimensions differ by millimetres",
+        "wider than the trends' own: 4 of 16 torques are not the maker's",
+    ),
+    "knees as stated": (
+        quadruped(),
+        ("--knee-drive", "knee"),
+        "knees: driven at the knee: as stated by --knee-drive",
+    ),
+}
 
 
-def test_the_summary_says_what_was_guessed(capsys: pytest.CaptureFixture[str]) -> None:
-    out = said(biped({"ankle": 1000.0, "elbow": None}, right_thigh=0.2529), capsys)
-    assert "torques: 12 declared, 2 replaced (implausible), 2 assumed (none in the file)" in out
-    assert "1 dimensions differ by millimetres" in out
-    assert "4 of 16 torques are not the maker's" in out
-
-
-def test_the_summary_tells_where_knees_are_driven(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "knees: driven at the knee: as stated by --knee-drive" in said(
-        quadruped(), capsys, "--knee-drive", "knee"
-    )
+@pytest.mark.parametrize("name", SUMMARY)
+def test_the_summary_says_what_was_read_and_what_was_guessed(name: str) -> None:
+    text, options, *words = SUMMARY[name]
+    out = said(text, *options)
+    assert [one for one in words if one not in out] == []
+    assert ("wider than" in out) == (name == "guesses")
 
 
 def test_the_band_is_wider_where_torques_are_assumed() -> None:
-    declared = expected(biped(), "a")
-    assumed = expected(biped(dict.fromkeys(TORQUES, None)), "b")
+    declared, assumed = expected(biped(), "a"), expected(biped(NONE), "b")
     assert width(assumed) > 1.05 * width(declared)
     assert declared.wider == ()
+    assert (declared.low, declared.high) == tuple(draft.load("a").resolve().mass_band())
     assert assumed.wider == ("16 of 16 torques are not the maker's",)
 
 
@@ -102,24 +106,12 @@ def test_the_band_is_wider_by_the_trends_of_another_population() -> None:
 
 
 def test_stated_torques_do_not_widen_the_band() -> None:
-    text = biped(dict.fromkeys(TORQUES, None))
-    Path("walker.urdf").write_text(text, encoding="utf-8")
-    options = Options(torque=Stated(named=TORQUES))
-    found = import_robot("walker.urdf", "a", options=options)
+    found = imported(biped(NONE), options=Options(torque=Stated(named=TORQUES)))
     assert expected_mass(found.spec.resolve(), found.files).wider == ()
 
 
-def test_draft_show_has_the_band_of_the_import(capsys: pytest.CaptureFixture[str]) -> None:
-    text = biped(dict.fromkeys(TORQUES, None))
-    mass = expected(text, "mine")
-    assert main(["show", "mine"]) == 0
-    out = capsys.readouterr().out
-    assert f"{mass.low:.1f} .. {mass.high:.1f}" in out
-    assert "wider: 16 of 16 torques are not the maker's" in " ".join(out.split())
-
-
 def test_the_band_of_an_import_follows_its_parameters() -> None:
-    expected(biped(dict.fromkeys(TORQUES, None)), "mine")
+    expected(biped(NONE))
     longer = draft.load("mine").resolve({"thigh_length": 0.3})
     own = mass_with_band(longer)
     assert own.mass == pytest.approx(float(longer.mass))
@@ -129,7 +121,7 @@ def test_the_band_of_an_import_follows_its_parameters() -> None:
 
 @pytest.mark.parametrize("text", ["", "[]", '{"wider_band": 3}', "{", '{"wider_band": {}}'])
 def test_a_damaged_report_widens_nothing(text: str) -> None:
-    expected(biped(dict.fromkeys(TORQUES, None)), "mine")
+    expected(biped(NONE))
     Path("mine/import.json").write_text(text, encoding="utf-8")
     design = draft.load("mine").resolve()
     found = mass_with_band(design)
@@ -143,34 +135,30 @@ def test_a_spec_of_ones_own_has_the_band_of_the_trends() -> None:
     assert ((own.low, own.high), own.wider) == (tuple(design.mass_band()), ())
 
 
-def test_the_report_of_the_import_has_the_band() -> None:
-    mass = expected(biped({"ankle": 1000.0}), "mine")
+def test_the_band_of_the_import_is_in_its_report_in_draft_show_and_in_that_of_its_twin() -> None:
+    mass = expected(biped({"ankle": 1000.0}))
+    why = "2 of 16 torques are not the maker's"
     table = json.loads(Path("mine/import.json").read_text("utf-8"))
     assert table["expected_mass_kg"]["band_90"] == pytest.approx([mass.low, mass.high])
-    assert table["expected_mass_kg"]["wider_because"] == ["2 of 16 torques are not the maker's"]
+    assert table["expected_mass_kg"]["wider_because"] == [why]
     assert table["wider_band"]["guessed_actuators"] == ["ankle_drive"]
-
-
-def test_a_twins_report_has_the_band_of_the_import(capsys: pytest.CaptureFixture[str]) -> None:
-    mass = expected(biped({"ankle": 1000.0}), "mine")
-    assert main(["twin", "walker.urdf", "--poses", "2"]) == 0
-    out = " ".join(capsys.readouterr().out.split())
+    out = line(printed("show", "mine"))
+    assert f"{mass.low:.1f} .. {mass.high:.1f}" in out
+    assert f"wider: {why}" in out
+    out = line(printed("twin", "beast.urdf", "--poses", "2"))
     assert f"mass: {mass.low:.1f} to {mass.high:.1f} kg" in out
-    assert "2 of 16 torques are not the maker's" in out
+    assert why in out
 
 
-def test_the_json_has_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("walker.urdf").write_text(biped(), encoding="utf-8")
-    assert main(["import", "walker.urdf", "--out", "mine", "--json"]) == 0
-    summary = json.loads(capsys.readouterr().out)["summary"]
+def test_the_json_has_the_summary() -> None:
+    summary = json.loads(said(biped(), "--json"))["summary"]
     assert summary["torques"] == {"declared": 16}
     low, high = summary["expected_mass_kg"]["band_90"]
     assert low < summary["expected_mass_kg"]["mass"] < high
 
 
 def test_a_robot_that_cannot_stand_weighs_at_most_what_its_torques_hold() -> None:
-    Path("walker.urdf").write_text(biped(), encoding="utf-8")
-    found = import_robot("walker.urdf", "a", options=Options(torque=Stated(named={"knee": 4.5})))
+    found = imported(biped(), options=Options(torque=Stated(named={"knee": 4.5})))
     design = found.spec.resolve()
     low, high = design.mass_band()
     mass = expected_mass(design, found.files)
@@ -181,12 +169,7 @@ def test_a_robot_that_cannot_stand_weighs_at_most_what_its_torques_hold() -> Non
     # The maker's robot stands, whatever torques a design is given later.
     stronger = found.spec.resolve({"actuators.knee_drive.peak_torque": 70})
     assert mass_with_band(stronger).wider == mass.wider
-    assert json.loads(Path("a/import.json").read_text())["wider_band"]["overload"] == times
-
-
-def test_robots_that_stand_have_the_band_of_the_trends() -> None:
-    mass = expected(biped(), "a")
-    assert (mass.low, mass.high) == tuple(draft.load("a").resolve().mass_band())
+    assert json.loads(Path("mine/import.json").read_text())["wider_band"]["overload"] == times
 
 
 def test_the_band_of_a_robot_without_legs_is_that_of_such_robots() -> None:

@@ -13,16 +13,12 @@ from draft.description.description import Geometry
 from draft.imports import solids
 from draft.imports.importer import Imported, import_robot
 from draft.values import scalar
-from tests.imports.written import joint, link, quadruped
+from tests.imports.written import bolt, imported, joint, link, notes, quadruped
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "descriptions"
 BOX = '<collision><geometry><box size="{}"/></geometry></collision>'
-
-
-def imported(folder: Path, text: str) -> Imported:
-    path = folder / "beast.urdf"
-    path.write_text(text, encoding="utf-8")
-    return import_robot(path, folder / "mine")
+# Of the box that has the inertia of each link of the quadruped [m].
+OWN = [0.4, 0.2, 0.1]
 
 
 def with_trunk(size: str, more: str = "") -> str:
@@ -35,26 +31,24 @@ def trunk(found: Imported) -> list[float]:
     return [float(design.parameters[f"trunk_{word}"]) for word in ("length", "width", "height")]
 
 
-def test_primitives_that_collide_bound_a_trunk_without_meshes(tmp_path: Path) -> None:
-    found = imported(tmp_path, with_trunk("0.5 0.25 0.12"))
+def test_primitives_that_collide_bound_a_trunk_without_meshes() -> None:
+    found = imported(with_trunk("0.5 0.25 0.12"))
     assert trunk(found) == pytest.approx([0.5, 0.25, 0.12], abs=3e-3)
     # Its maker describes it so: nothing to warn of.
     assert found.files.trunk == "its primitives"
-    assert not any("stand in" in str(note) for note in found.notes)
+    assert not notes(found, "stand in")
 
 
-def test_a_missing_mesh_and_what_stands_in_for_the_trunk_are_one_warning(tmp_path: Path) -> None:
-    path = tmp_path / "beast.urdf"
-    path.write_text(quadruped(mesh="gone.stl"), encoding="utf-8")
-    notes = import_robot(path, tmp_path / "mine").notes
-    (told,) = (note.cause for note in notes if "mesh" in note.cause)
-    assert told == "mesh 'gone.stl' is missing; for the trunk, the box with its inertia stands in"
+def test_a_missing_mesh_and_what_stands_in_for_the_trunk_are_one_warning() -> None:
+    (told,) = notes(imported(quadruped(mesh="gone.stl")), "mesh")
+    words = "mesh 'gone.stl' is missing; for the trunk, the box with its inertia stands in"
+    assert told == f"beast.urdf:2: {words}"
 
 
-def test_primitives_far_smaller_than_the_trunk_do_not(tmp_path: Path) -> None:
-    found = imported(tmp_path, with_trunk("0.05 0.05 0.05"))
-    assert trunk(found) == pytest.approx([0.4, 0.2, 0.1], abs=3e-3)
-    assert any("the box with its inertia stands in" in str(note) for note in found.notes)
+def test_primitives_far_smaller_than_the_trunk_do_not() -> None:
+    found = imported(with_trunk("0.05 0.05 0.05"))
+    assert trunk(found) == pytest.approx(OWN, abs=3e-3)
+    assert notes(found, "the box with its inertia stands in")
 
 
 def head(kind: str, name: str = "head") -> str:
@@ -68,10 +62,8 @@ def head(kind: str, name: str = "head") -> str:
     ("more", "name"),
     [(head("revolute"), "head"), (head("fixed", "carry_handle"), "carry_handle")],
 )
-def test_a_held_head_and_a_handle_are_boxes_of_their_own(
-    more: str, name: str, tmp_path: Path
-) -> None:
-    found = imported(tmp_path, with_trunk("0.5 0.25 0.12", more))
+def test_a_held_head_and_a_handle_are_boxes_of_their_own(more: str, name: str) -> None:
+    found = imported(with_trunk("0.5 0.25 0.12", more))
     assert trunk(found) == pytest.approx([0.5, 0.25, 0.12], abs=3e-3)
     design = found.spec.resolve()
     part = next(body for body in design.bodies if body.name == name)
@@ -83,13 +75,13 @@ def test_a_held_head_and_a_handle_are_boxes_of_their_own(
     assert [float(x) for x in part.position] == pytest.approx([0.33, 0, 0.1], abs=1e-3)
 
 
-def test_what_a_limb_hangs_on_stays_part_of_the_trunk(tmp_path: Path) -> None:
+def test_what_a_limb_hangs_on_stays_part_of_the_trunk() -> None:
     text = with_trunk("0.5 0.25 0.12")
     shoulder = link("payload_frame").replace("</link>", f"{BOX.format('0.1 0.1 0.1')}</link>")
     arm = joint("bolt", "body", "payload_frame", (0.4, 0, 0.1), kind="fixed")
     arm += link("boom") + joint("swing", "payload_frame", "boom", (0, 0, 0.1), "0 0 1")
     text = text.replace("</robot>", shoulder + arm + "</robot>")
-    assert "payload_frame" not in {body.name for body in imported(tmp_path, text).spec.bodies}
+    assert "payload_frame" not in {body.name for body in imported(text).spec.bodies}
 
 
 @pytest.mark.parametrize(
@@ -110,13 +102,9 @@ def test_primitives_are_cut_like_meshes(
     assert points.min(axis=0)[0] == pytest.approx(0.1 - edges[0] / 2, abs=1e-6)
 
 
-@pytest.mark.parametrize("name", ["unitree_go2/go2.urdf", "beast"])
-def test_the_trunk_of_an_import_keeps_its_mass_when_only_legs_change(
-    tmp_path: Path, name: str
-) -> None:
-    file = tmp_path / "beast.urdf"
-    file.write_text(quadruped() if name == "beast" else (EXAMPLES / name).read_text())
-    spec = import_robot(file, tmp_path / "mine").spec
+@pytest.mark.parametrize("text", [quadruped(), (EXAMPLES / "unitree_go2/go2.urdf").read_text()])
+def test_the_trunk_of_an_import_keeps_its_mass_when_only_legs_change(text: str) -> None:
+    spec = imported(text).spec
     before = spec.resolve()
     longer = spec.resolve({"thigh_length": 1.2 * before.parameters["thigh_length"]})
     assert scalar(longer.leg_length or 0) > 1.08 * scalar(before.leg_length or 0)
@@ -124,26 +112,21 @@ def test_the_trunk_of_an_import_keeps_its_mass_when_only_legs_change(
     assert longer.mass > before.mass
 
 
-def test_an_import_weighs_what_the_law_says_at_its_own_legs(tmp_path: Path) -> None:
-    spec = imported(tmp_path, quadruped()).spec
-    assert (
-        "thigh + shank of the robot that it came from" in (tmp_path / "mine/root.yaml").read_text()
-    )
+def test_an_import_weighs_what_the_law_says_at_its_own_legs() -> None:
+    spec = imported(quadruped()).spec
+    assert "thigh + shank of the robot that it came from" in Path("mine/root.yaml").read_text()
+    own = spec.resolve()
     by_law = replace(spec, root=replace(spec.root, leg_length=None)).resolve()
-    assert spec.resolve().trunk.leg_length == pytest.approx(by_law.leg_length, rel=1e-9)
-    masses = spec.resolve().body_masses()
-    assert masses == pytest.approx(by_law.body_masses(), rel=1e-9)
+    assert own.trunk.leg_length == pytest.approx(by_law.leg_length, rel=1e-9)
+    assert own.body_masses() == pytest.approx(by_law.body_masses(), rel=1e-9)
     # A larger trunk is heavier, by the law.
-    wider = {"trunk_width": 0.3}
-    ratio = spec.resolve(wider).trunk.mass / spec.resolve().trunk.mass
-    volumes = spec.resolve(wider).trunk.loft.volume / spec.resolve().trunk.loft.volume
-    assert ratio == pytest.approx(volumes**0.5)
+    wide = spec.resolve({"trunk_width": 0.3}).trunk
+    volumes = wide.loft.volume / own.trunk.loft.volume
+    assert wide.mass / own.trunk.mass == pytest.approx(volumes**0.5)
 
 
-def test_an_import_on_other_legs_states_no_leg_length(tmp_path: Path) -> None:
-    found = import_robot(
-        EXAMPLES / "unitree_go2/go2.urdf", tmp_path / "mine", population="humanoid"
-    )
+def test_an_import_on_other_legs_states_no_leg_length() -> None:
+    found = import_robot(EXAMPLES / "unitree_go2/go2.urdf", "mine", population="humanoid")
     assert "leg_length" not in (found.folder / "root.yaml").read_text()
 
 
@@ -151,26 +134,18 @@ def bolted(name: str, parent: str, xyz: str, size: str, mass: float) -> str:
     """A link with a box, fixed to its parent."""
     return (
         f'<link name="{name}"><inertial><mass value="{mass}"/><inertia ixx="0.05" iyy="0.05" '
-        f'izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><box size="{size}"/>'
-        f'</geometry></collision></link><joint name="{name}_bolt" type="fixed"><parent '
-        f'link="{parent}"/><child link="{name}"/><origin xyz="{xyz}"/></joint>'
-    )
+        f'izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial>{BOX.format(size)}</link>'
+    ) + bolt(f"{name}_bolt", parent, name, xyz)
 
 
-def test_a_trunk_whose_mesh_is_missing_is_not_stretched_over_its_mast(tmp_path: Path) -> None:
-    """The box with the trunk's own inertia, 0.4 x 0.2 x 0.1 m, and not that of base and mast."""
+def test_a_trunk_whose_mesh_is_missing_is_not_stretched_over_its_mast() -> None:
     more = bolted("mast", "body", "-0.1 0 0.7", "0.05 0.05 1.2", 1.0)
     more += bolted("head", "mast", "0 0 0.7", "0.2 0.3 0.2", 2.0)
-    path = tmp_path / "beast.urdf"
-    path.write_text(quadruped(more, mesh="gone.stl"), encoding="utf-8")
-    found = import_robot(path, tmp_path / "tall")
+    found = imported(quadruped(more, mesh="gone.stl"), out="tall")
     values = found.files.texts["parameters.yaml"]
-    size = [
-        float(x) for x in re.findall(r"trunk_(?:length|width|height): {value: ([0-9.]+)", values)
-    ]
-    assert size == pytest.approx([0.4, 0.2, 0.1], abs=0.02)
-    (told,) = (str(note) for note in found.notes if "stands in" in str(note))
+    size = re.findall(r"trunk_(?:length|width|height): {value: ([0-9.]+)", values)
+    assert [float(x) for x in size] == pytest.approx(OWN, abs=0.02)
+    (told,) = notes(found, "stands in")
     assert "without what reaches far out of it: 'mast', 'head'" in told
-    path.write_text(quadruped(mesh="gone.stl"), encoding="utf-8")
-    plain = import_robot(path, tmp_path / "plain")
+    plain = imported(quadruped(mesh="gone.stl"), out="plain")
     assert found.spec.resolve().mass == pytest.approx(plain.spec.resolve().mass)

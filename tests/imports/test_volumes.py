@@ -11,30 +11,28 @@ import numpy as np
 import pytest
 
 import draft
-from draft.imports.importer import Imported, import_robot
+from draft.imports.importer import Imported
 from draft.imports.options import Options
 from draft.imports.reduce import Body
 from draft.imports.shapes import volume
 from draft.imports.spec_tree import Writer
 from draft.imports.stated import parse
 from draft.imports.volumes import DENSITIES
-from tests.imports.written import CUBE, quadruped
+from tests.imports.written import CUBE, imported, quadruped, written
 
 LONG = 0.2
+TREE = Path("mine/tree.yaml")
 
 
-def imported(
-    folder: Path, width: float, name: str, torque: str = "", factor: float = 1.0
-) -> Imported:
+def made(width: float, torque: str = "", factor: float = 1.0) -> Imported:
     """Import a quadruped whose legs are rods of a width [m]."""
-    (folder / "rod.obj").write_text(CUBE, encoding="utf-8")
+    written(CUBE, "rod.obj")
     text = re.sub('effort="[0-9]+" ', "", quadruped(factor=factor))
     scale = f"{width / 0.6} {width / 0.2} {LONG / 0.1}"
     shape = f'<visual><geometry><mesh filename="rod.obj" scale="{scale}"/></geometry></visual>'
     text = re.sub('(_(?:hip|thigh|calf)".*?)</link>', rf"\1{shape}</link>", text)
-    (folder / "walker.urdf").write_text(text, encoding="utf-8")
     given = Options(torque=parse([torque], "--torque", "N m")) if torque else Options()
-    return import_robot(folder / "walker.urdf", folder / name, options=given)
+    return imported(text, out=f"mine{factor:g}" if factor != 1 else "mine", options=given)
 
 
 def structure(found: Imported, kind: str, change: dict[str, float] | None = None) -> float:
@@ -54,8 +52,8 @@ def test_the_volume_of_a_box_is_its_volume_however_it_lies(seed: int) -> None:
     assert volume(triangles) == pytest.approx(0.3 * 0.04 * 0.06, rel=0.01)
 
 
-def test_slim_thighs_weigh_their_visible_volume_with_their_drives(tmp_path: Path) -> None:
-    found = imported(tmp_path, 0.03, "slim")
+def test_slim_thighs_weigh_their_visible_volume_with_their_drives() -> None:
+    found = made(0.03)
     design = found.spec.resolve()
     bodies = {body.name: body for body in design.bodies}
     knee = bodies["FL_thigh"].actuator
@@ -65,14 +63,15 @@ def test_slim_thighs_weigh_their_visible_volume_with_their_drives(tmp_path: Path
     assert "slimmer" in (found.folder / "import.json").read_text(encoding="utf-8")
 
 
-def test_legs_of_a_usual_width_weigh_by_length(tmp_path: Path) -> None:
-    found = imported(tmp_path, 0.12, "thick")
-    assert "per_metre" not in (found.folder / "tree.yaml").read_text(encoding="utf-8")
-    assert "density: population" in (found.folder / "root.yaml").read_text(encoding="utf-8")
+@pytest.mark.parametrize("torque", ["", "2"])
+def test_legs_of_a_usual_width_weigh_by_length_also_with_weak_drives(torque: str) -> None:
+    made(0.12, torque)
+    assert "per_metre" not in TREE.read_text(encoding="utf-8")
+    assert "density: population" in Path("mine/root.yaml").read_text(encoding="utf-8")
 
 
-def test_a_longer_slim_leg_weighs_more_in_proportion(tmp_path: Path) -> None:
-    found = imported(tmp_path, 0.03, "slim")
+def test_a_longer_slim_leg_weighs_more_in_proportion() -> None:
+    found = made(0.03)
     longer = structure(found, "thigh", {"thigh_length": 0.44})
     assert longer == pytest.approx(structure(found, "thigh") * 2, rel=1e-6)
 
@@ -90,8 +89,8 @@ def test_each_member_of_a_slim_link_with_a_bend_weighs_by_its_own_length() -> No
     assert masses == ["thigh_per_metre * thigh_length", "thigh_per_metre * thigh_length_2"]
 
 
-def test_a_slim_trunk_gets_a_density_only_below_that_of_the_structure_law(tmp_path: Path) -> None:
-    found = imported(tmp_path, 0.03, "slim")
+def test_a_slim_trunk_gets_a_density_only_below_that_of_the_structure_law() -> None:
+    found = made(0.03)
     stated = found.spec.resolve()
     text = (found.folder / "root.yaml").read_text(encoding="utf-8")
     by_law = re.sub("density: .*", "density: population", text)
@@ -99,16 +98,11 @@ def test_a_slim_trunk_gets_a_density_only_below_that_of_the_structure_law(tmp_pa
     assert float(stated.trunk.mass) <= float(draft.load(found.folder).resolve().trunk.mass)
 
 
-def test_stating_the_torques_of_a_slim_robot_keeps_its_limbs_slim(tmp_path: Path) -> None:
-    tree = imported(tmp_path, 0.03, "stated", "2").folder / "tree.yaml"
-    assert "mass: thigh_per_metre * thigh_length" in tree.read_text(encoding="utf-8")
+def test_stating_the_torques_of_a_slim_robot_keeps_its_limbs_slim() -> None:
+    made(0.03, "2")
+    assert "mass: thigh_per_metre * thigh_length" in TREE.read_text(encoding="utf-8")
 
 
-def test_weak_drives_in_wide_limbs_do_not_make_them_light(tmp_path: Path) -> None:
-    found = imported(tmp_path, 0.12, "weak", "2")
-    assert "per_metre" not in (found.folder / "tree.yaml").read_text(encoding="utf-8")
-
-
-def test_no_mass_of_the_maker_enters(tmp_path: Path) -> None:
-    light, heavy = (imported(tmp_path, 0.03, f"x{k}", factor=k) for k in (1, 5))
-    assert float(light.spec.resolve().mass) == float(heavy.spec.resolve().mass)
+def test_no_mass_of_the_maker_enters() -> None:
+    light, heavy = (made(0.03, factor=factor).spec.resolve() for factor in (1, 5))
+    assert float(light.mass) == float(heavy.mass)

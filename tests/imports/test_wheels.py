@@ -8,44 +8,40 @@ import mujoco
 import numpy as np
 import pytest
 
-from draft.imports.importer import Imported, import_robot
 from draft.values import scalar
 from tests.imports.test_limbs import BIPED, FOUR, limb, robot
-from tests.imports.written import joint, link
+from tests.imports.written import imported, joint, link
 
 TURNS = 'effort="9" velocity="30"'
 
 
-def rolling(places: tuple[tuple[float, float], ...], kind: str = "continuous") -> str:
+def rolling(places: tuple[tuple[float, float], ...]) -> str:
     """A robot with a wheel of radius 0.1 m at the end of each leg, which no name calls so."""
+    shape = (
+        '<collision><origin rpy="1.5707963 0 0"/><geometry><cylinder radius="0.1" '
+        'length="0.05"/></geometry></collision></link>'
+    )
     parts: list[str] = []
     for i, (x, y) in enumerate(places):
-        leg = limb(f"l{i}", "base", (x, y, 0), ((0, 0, -0.3), (0, 0, -0.3), (0, 0, 0)))
-        disc = link(f"disc{i}").replace(
-            "</link>",
-            '<collision><origin rpy="1.5707963 0 0"/><geometry><cylinder radius="0.1" '
-            'length="0.05"/></geometry></collision></link>',
-        )
-        limit = TURNS if kind == "continuous" else f'lower="-1" upper="1" {TURNS}'
         parts += [
-            leg,
-            disc,
-            joint(f"turn{i}", f"l{i}2", f"disc{i}", (0, 0, 0), limit=limit, kind=kind),
+            limb(f"l{i}", "base", (x, y, 0), ((0, 0, -0.3), (0, 0, -0.3), (0, 0, 0))),
+            link(f"disc{i}").replace("</link>", shape),
+            joint(f"turn{i}", f"l{i}2", f"disc{i}", (0, 0, 0), limit=TURNS, kind="continuous"),
         ]
     return robot(*parts).replace('_tip"', '_cap"')
 
 
-def made(text: str, folder: Path) -> Imported:
-    (folder / "r.urdf").write_text(text)
-    return import_robot(folder / "r.urdf", folder / "out")
+def walking() -> str:
+    """A robot of four legs."""
+    return robot(*(limb(f"l{i}", "base", (x, y, 0)) for i, (x, y) in enumerate(FOUR)))
 
 
 @pytest.mark.parametrize("places", [BIPED, FOUR])
 def test_a_wheel_is_a_cylinder_that_turns_without_end_and_stands_on_its_rim(
-    places: tuple[tuple[float, float], ...], tmp_path: Path
+    places: tuple[tuple[float, float], ...],
 ) -> None:
-    found = made(rolling(places), tmp_path)
-    text = (tmp_path / "out" / "tree.yaml").read_text()
+    found = imported(rolling(places))
+    text = Path("mine/tree.yaml").read_text()
     assert "type: wheel" in text
     assert "plate" not in text
     design = found.spec.resolve()
@@ -60,9 +56,9 @@ def test_a_wheel_is_a_cylinder_that_turns_without_end_and_stands_on_its_rim(
     assert scalar(design.lowest()) == pytest.approx(0.7, abs=0.02)
 
 
-def test_a_wheel_rolls(tmp_path: Path) -> None:
-    made(rolling(FOUR), tmp_path).spec.resolve().build().save(tmp_path / "model")
-    scene = mujoco.MjModel.from_xml_path(str(tmp_path / "model" / "scene.xml"))
+def test_a_wheel_rolls() -> None:
+    imported(rolling(FOUR)).spec.resolve().build().save(Path("model"))
+    scene = mujoco.MjModel.from_xml_path("model/scene.xml")
     data = mujoco.MjData(scene)
     mujoco.mj_resetDataKeyframe(scene, data, 0)
     wheels = [i for i in range(scene.nu) if not scene.jnt_limited[scene.actuator_trnid[i, 0]]]
@@ -73,36 +69,32 @@ def test_a_wheel_rolls(tmp_path: Path) -> None:
     assert data.qpos[2] > 0.5
 
 
-def test_a_joint_without_limits_is_continuous_in_the_model_and_in_its_urdf(
-    tmp_path: Path,
-) -> None:
-    text = robot(*(limb(f"l{i}", "base", (x, y, 0)) for i, (x, y) in enumerate(FOUR)))
-    text = text.replace('name="jl00" type="revolute"', 'name="jl00" type="continuous"')
-    found = made(text, tmp_path)
+def test_a_joint_without_limits_is_continuous_in_the_model_and_in_its_urdf() -> None:
+    found = imported(
+        walking().replace('name="jl00" type="revolute"', 'name="jl00" type="continuous"')
+    )
     design = found.spec.resolve()
     assert [joint.kind for joint in design.joints.values()].count("continuous") == 1
     model = design.build()
     free = model.mujoco.joint(found.joints["jl00"]).id
     assert np.flatnonzero(model.mujoco.jnt_limited == 0).tolist() == [0, free]
-    folder = model.save(tmp_path / "model", formats=("mjcf", "urdf"))
+    folder = model.save(Path("model"), formats=("mjcf", "urdf"))
     urdf = (folder / "robot.urdf").read_text()
     assert urdf.count('type="continuous"') == 1
-    again = import_robot(folder / "robot.urdf", tmp_path / "again")
-    assert [j.kind for j in again.spec.resolve().joints.values()].count("continuous") == 1
+    again = imported(urdf, out="again").spec.resolve()
+    assert [joint.kind for joint in again.joints.values()].count("continuous") == 1
 
 
-def test_a_knee_that_turns_without_end_is_no_wheel(tmp_path: Path) -> None:
-    text = robot(*(limb(f"l{i}", "base", (x, y, 0)) for i, (x, y) in enumerate(FOUR)))
-    made(text.replace('"revolute"', '"continuous"'), tmp_path)
-    assert "wheel" not in (tmp_path / "out" / "tree.yaml").read_text()
+def test_a_knee_that_turns_without_end_is_no_wheel() -> None:
+    imported(walking().replace('"revolute"', '"continuous"'))
+    assert "wheel" not in Path("mine/tree.yaml").read_text()
 
 
-def test_a_caster_is_a_wheel_and_no_leg(tmp_path: Path) -> None:
+def test_a_caster_is_a_wheel_and_no_leg() -> None:
     text = rolling(FOUR).replace('name="base"', 'name="base" ', 1)
     wheel = joint("roll", "base", "rim", (0.5, 0, -0.3), limit=TURNS, kind="continuous")
-    text = text.replace("</robot>", link("rim") + wheel + "</robot>")
-    found = made(text, tmp_path)
+    found = imported(text.replace("</robot>", link("rim") + wheel + "</robot>"))
     assert found.limbs.legs == 4
-    tree = (tmp_path / "out" / "tree.yaml").read_text()
+    tree = Path("mine/tree.yaml").read_text()
     assert tree.count("type: wheel") == 2
     assert tree.count("site: foot") == 1

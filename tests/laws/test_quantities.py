@@ -85,41 +85,23 @@ def test_a_quantity_is_added_by_its_line_and_its_law(added: dict[str, Any]) -> N
     assert (record["unit"], record["origin"], record["from"]) == ("kN m/kg", "derived", "tau / m")
     assert set(record["inputs"]) == {"peak_torque", "mass"}
     assert added["resolved"] == record["value"]
-
-
-@pytest.mark.slow
-def test_an_added_quantity_is_read_by_expressions_conditions_and_ranges(
-    added: dict[str, Any],
-) -> None:
+    # Expressions, conditions and ranges.
     assert added["expression"] == pytest.approx(0.2)
     assert added["condition"]
     assert added["varied"] == "kN m/kg"
-
-
-@pytest.mark.slow
-def test_an_added_quantity_is_in_tables_pages_and_the_studio_in_its_shown_unit(
-    added: dict[str, Any],
-) -> None:
-    value = added["record"]["value"] * 1e3
+    # Tables, pages and the studio, in the unit that is shown.
     (row,) = (line for line in added["show"].splitlines() if "torque per mass" in line)
-    assert row.split()[3:6] == [f"{value:.4g}", "N", "m/kg"]
+    assert row.split()[3:6] == [f"{record['value'] * 1e3:.4g}", "N", "m/kg"]
     assert "torque per mass<small>N m/kg</small>" in added["page"]
     assert "torque per mass" in added["card"]
     assert added["field"]
     slider = added["slider"]
     assert (slider["name"], slider["unit"]) == ("actuators.leg.torque_density", "kN m/kg")
-    assert slider["doc"].startswith("Peak torque over mass [kN m/kg]. Catalogue modules:")
-
-
-@pytest.mark.slow
-def test_an_added_quantity_is_in_the_schema_the_reference_and_the_fits(
-    added: dict[str, Any],
-) -> None:
-    key = added["schema"]["properties"]["torque_density"]
-    assert key["description"] == "Peak torque over mass [kN m/kg]."
-    assert (
-        "| `torque_density` | *number* | Peak torque over mass [kN m/kg]. |" in (added["reference"])
-    )
+    text = "Peak torque over mass [kN m/kg]."
+    assert slider["doc"].startswith(f"{text} Catalogue modules:")
+    # The schema, the reference and the fits.
+    assert added["schema"]["properties"]["torque_density"]["description"] == text
+    assert f"| `torque_density` | *number* | {text} |" in added["reference"]
     assert "`mass`, `torque_density`," in added["reference"]
     assert added["column"] == 114
 

@@ -10,33 +10,30 @@ from hypothesis import strategies as st
 from draft.laws.law import Law
 from draft.laws.structure import population
 
+PEOPLE = ("humanoid", "quadruped")
 TRENDS = [
-    (people, name) for people in ("humanoid", "quadruped") for name in population(people).segments
+    pytest.param(law, id=f"{people}-{name}")
+    for people in PEOPLE
+    for name, law in population(people).segments.items()
 ]
-shares = st.floats(0.0, 1.0)
+trends = st.sampled_from([case.values[0] for case in TRENDS])
 anywhere = st.floats(1e-3, 5.0)
 
 
-def _trend(key: tuple[str, str]) -> Law:
-    return population(key[0]).segments[key[1]]
-
-
-@given(st.sampled_from(TRENDS), shares)
+@given(trends, st.floats(0.0, 1.0))
 def test_inside_its_lengths_a_class_weighs_c_times_length_to_the_e(
-    key: tuple[str, str], share: float
+    trend: Law, share: float
 ) -> None:
-    trend = _trend(key)
     low, high = trend.range
     length = low + share * (high - low)
     assert trend(length) == pytest.approx(trend.coefficient * length**trend.exponent)
     assert not trend.outside(length)
 
 
-@given(st.sampled_from(TRENDS), st.floats(1.01, 10))
+@given(trends, st.floats(1.01, 10))
 def test_outside_its_lengths_a_class_keeps_the_mass_per_metre_of_the_edge(
-    key: tuple[str, str], factor: float
+    trend: Law, factor: float
 ) -> None:
-    trend = _trend(key)
     for edge, length in (
         (trend.range[0], trend.range[0] / factor),
         (trend.range[1], trend.range[1] * factor),
@@ -44,38 +41,28 @@ def test_outside_its_lengths_a_class_keeps_the_mass_per_metre_of_the_edge(
         assert trend(length) / length == pytest.approx(trend(edge) / edge)
 
 
-@pytest.mark.parametrize("key", TRENDS, ids="-".join)
-def test_mass_does_not_jump_at_the_edges_of_a_class(key: tuple[str, str]) -> None:
-    trend = _trend(key)
-    for edge in trend.range:
+@pytest.mark.parametrize("trend", TRENDS)
+def test_mass_does_not_jump_at_the_edges_and_they_are_known_to_half_a_millimetre(
+    trend: Law,
+) -> None:
+    low, high = trend.range
+    for edge in (low, high):
         below, above = trend(edge * (1 - 1e-9)), trend(edge * (1 + 1e-9))
         assert below == pytest.approx(above, rel=1e-7)
+    assert all(map(trend.outside, (low - 6e-4, high + 6e-4)))
+    assert not any(map(trend.outside, (low - 4e-4, high + 4e-4)))
 
 
-@pytest.mark.parametrize("key", TRENDS, ids="-".join)
-def test_a_length_is_outside_beyond_half_a_millimetre_of_the_printed_range(
-    key: tuple[str, str],
-) -> None:
-    trend = _trend(key)
-    low, high = trend.range
-    assert trend.outside(low - 6e-4)
-    assert trend.outside(high + 6e-4)
-    assert not trend.outside(low - 4e-4)
-    assert not trend.outside(high + 4e-4)
-
-
-@given(st.sampled_from(TRENDS), anywhere, st.floats(1.001, 3))
+@given(trends, anywhere, st.floats(1.001, 3))
 def test_a_longer_segment_outside_the_fit_is_never_lighter(
-    key: tuple[str, str], length: float, factor: float
+    trend: Law, length: float, factor: float
 ) -> None:
-    trend = _trend(key)
     # A flat fit (exponent 0) holds its mass; every other class gains with length.
     assert trend(length * factor) >= trend(length) * (1 - 1e-12)
 
 
-@given(st.sampled_from(TRENDS), st.lists(anywhere, min_size=1, max_size=6))
-def test_arrays_weigh_what_floats_weigh(key: tuple[str, str], lengths: list[float]) -> None:
-    trend = _trend(key)
+@given(trends, st.lists(anywhere, min_size=1, max_size=6))
+def test_arrays_weigh_what_floats_weigh(trend: Law, lengths: list[float]) -> None:
     array = np.array(lengths)
     assert trend(array) == pytest.approx([trend(x) for x in lengths], rel=1e-13)
     assert list(trend.outside(array)) == [trend.outside(x) for x in lengths]  # type: ignore[arg-type]
@@ -93,7 +80,7 @@ def test_the_shipped_trends_are_the_printed_ones_where_the_files_allow() -> None
     assert (quadruped.allometry.coefficient, quadruped.allometry.exponent) == (136, 2.47)
 
 
-@pytest.mark.parametrize("people", ["humanoid", "quadruped"])
+@pytest.mark.parametrize("people", PEOPLE)
 def test_whole_robots_with_longer_legs_have_more_structure(people: str) -> None:
     law = population(people).whole
     low, high = law.range
@@ -101,7 +88,7 @@ def test_whole_robots_with_longer_legs_have_more_structure(people: str) -> None:
     assert law(np.array([low, high])) == pytest.approx([law(low), law(high)])
 
 
-@pytest.mark.parametrize("people", ["humanoid", "quadruped"])
+@pytest.mark.parametrize("people", PEOPLE)
 def test_leg_length_predicts_held_out_robots_better_than_the_sum_over_classes(
     people: str,
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import pytest
@@ -37,28 +38,9 @@ def build(members: tuple[LeggedRobot, ...]) -> Callable[..., Any]:
 
 
 @pytest.fixture(scope="session")
-def _flat(build: Callable[..., Any]) -> Any:
-    return build(ground="flat")
-
-
-@pytest.fixture(scope="session")
-def _base(build: Callable[..., Any]) -> Any:
-    return build()
-
-
-@pytest.fixture(scope="session")
-def _terrain(build: Callable[..., Any]) -> Any:
-    return build(stage="terrain")
-
-
-@pytest.fixture(scope="session")
-def _velocity(build: Callable[..., Any]) -> Any:
-    return build(stage="velocity", ground="flat")
-
-
-@pytest.fixture(scope="session")
-def _push(build: Callable[..., Any]) -> Any:
-    return build(stage="push", ground="flat")
+def _shared(build: Callable[..., Any]) -> Callable[..., Any]:
+    """Build an environment at its first use only."""
+    return cache(build)
 
 
 def _anew(env: Any) -> Any:
@@ -68,30 +50,30 @@ def _anew(env: Any) -> Any:
 
 
 @pytest.fixture
-def flat(_flat: Any) -> Any:
+def flat(_shared: Callable[..., Any]) -> Any:
     """Stage base on a plane, all three designs, just reset."""
-    return _anew(_flat)
+    return _anew(_shared(ground="flat"))
 
 
 @pytest.fixture
-def base(_base: Any) -> Any:
+def base(_shared: Callable[..., Any]) -> Any:
     """Stage base, all three designs, just reset."""
-    return _anew(_base)
+    return _anew(_shared())
 
 
 @pytest.fixture
-def terrain(_terrain: Any) -> Any:
+def terrain(_shared: Callable[..., Any]) -> Any:
     """Stage terrain, all three designs, just reset."""
-    return _anew(_terrain)
+    return _anew(_shared(stage="terrain"))
 
 
 @pytest.fixture
-def velocity(_velocity: Any) -> Any:
+def velocity(_shared: Callable[..., Any]) -> Any:
     """Stage velocity on a plane, all three designs, just reset."""
-    return _anew(_velocity)
+    return _anew(_shared(stage="velocity", ground="flat"))
 
 
 @pytest.fixture
-def push(_push: Any) -> Any:
+def push(_shared: Callable[..., Any]) -> Any:
     """Stage push on a plane, all three designs, just reset."""
-    return _anew(_push)
+    return _anew(_shared(stage="push", ground="flat"))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -18,8 +17,7 @@ from draft.explore.where import condition
 from draft.laws import limits
 from draft.metrics import Carry, carry, find, of_design, overload, payload_for
 from draft.metrics.heat import LIMITS, hold_time_fold
-from draft.metrics.statics import payload_at
-from draft.model.model import TOLERANCE
+from draft.metrics.statics import payload_at, payload_peak
 from draft.values import scalar
 from tests.helpers import parameter, robot
 from tests.metrics.test_physics import PLANAR, tuned
@@ -29,46 +27,23 @@ QUADRUPED = draft.load("quadruped")
 
 
 @pytest.mark.parametrize(("name", "label"), SHIPPED)
-def test_torques_of_standing_at_home_are_mujocos_inverse_statics(
-    name: str, label: str | None
-) -> None:
+def test_standing_takes_the_share_of_its_worst_joint(name: str, label: str | None) -> None:
     design = shipped(name, label)
-    model = design.build().mujoco
-    data = mujoco.MjData(model)
-    data.qpos[:] = 0
-    data.qpos[3] = 1
-    for joint_name, joint in design.joints.items():
-        data.qpos[model.joint(joint_name).qposadr[0]] = joint.home
-    mujoco.mj_forward(model, data)
-    feet = [foot for kind in legs(design) for foot in kind.feet]
-    held = np.array(data.qfrc_bias)
-    for foot in feet:
-        body = design.bodies[foot]
-        here = model.body(body.name).id
-        jacobian = np.empty((3, model.nv))
-        tip = np.array(body.link.tip, dtype=float)
-        point = data.xpos[here] + data.xmat[here].reshape(3, 3) @ tip
-        mujoco.mj_jac(model, data, jacobian, None, point, here)
-        held -= model.body_subtreemass[1] * 9.81 / len(feet) * jacobian[2]
-    for load in home_loads(design):
-        for joint_name in load.joint.names:
-            torque = held[model.joint(joint_name).dofadr[0]]
-            assert abs(torque) == pytest.approx(abs(load.torque), rel=TOLERANCE, abs=1e-9)
     worst = max(abs(x.torque) / x.actuator.rated_torque for x in home_loads(design))
     assert of_design(design, ["standing_torque_rated"])["standing_torque_rated"] == worst
 
 
 @pytest.mark.parametrize(("name", "label"), SHIPPED)
-@pytest.mark.parametrize("share", [1.0, 1.5])
-def test_with_its_payload_one_joint_is_at_its_share_of_the_rated_torque(
-    name: str, label: str | None, share: float
+@pytest.mark.parametrize("share", [1.0, 1.5, None], ids=["rated", "1.5 rated", "peak"])
+def test_with_its_payload_one_joint_is_at_its_share_of_the_torque(
+    name: str, label: str | None, share: float | None
 ) -> None:
     design = shipped(name, label)
-    payload = payload_at(design, share)
-    found = [
-        abs(x.torque + payload * x.per_mass) / (share * x.actuator.rated_torque)
-        for x in loads(design)
-    ]
+    payload = payload_peak(design) if share is None else payload_at(design, share)
+    found = []
+    for x in loads(design):
+        most = x.actuator.peak_torque if share is None else share * x.actuator.rated_torque
+        found.append(abs(x.torque + payload * x.per_mass) / most)
     assert max(found) == pytest.approx(1)
     if share == 1.0:
         assert of_design(design, ["payload_rated"])["payload_rated"] == payload
@@ -118,13 +93,6 @@ def test_a_weak_robot_stands_for_the_time_of_its_worst_joint() -> None:
     found = of_design(weak, ["hold_time", "standing_torque_rated"])
     assert found["hold_time"] == limits.hold_time(found["standing_torque_rated"])
     assert math.isfinite(float(found["hold_time"]))
-
-
-def test_a_robot_without_legs_has_no_time_to_stand() -> None:
-    from tests.metrics.test_registry import leg
-
-    spec = robot(leg(shank={"type": "basic", "sphere": None}))
-    assert math.isnan(float(of_design(spec.resolve(), ["hold_time"])["hold_time"]))
 
 
 def test_a_payload_for_longer_is_smaller_and_its_band_spans_it() -> None:
@@ -201,15 +169,12 @@ def test_many_designs_carry_what_each_of_them_does() -> None:
     torques = np.array([20.0, 40.0, 72.0, 110.0])
     many = QUADRUPED.resolve({"actuators.leg.peak_torque": torques})
     together = carry(many, np.array([0.0, 10.0, 30.0, 5.0]), 1.0)
-    loads_ = payload_for(many, 60.0)
     for i, mass in enumerate((0.0, 10.0, 30.0, 5.0)):
         one: Carry = carry(many[i], mass, 1.0)
         assert np.asarray(together.margin)[i] == pytest.approx(one.margin)
         assert together.joint[i] == one.joint
         assert together.limit[i] == one.limit
         assert np.asarray(together.accepted)[i] == one.accepted
-        alone = payload_for(many[i], 60.0)
-        assert [np.asarray(end)[i] for end in loads_] == pytest.approx(list(alone))
     same = carry(QUADRUPED.resolve({"crouch": np.array([1.0, 1.0])}), 5.0)
     assert np.shape(same.margin) == (2,)
 
@@ -232,12 +197,6 @@ def test_standing_above_the_rated_torque_is_a_warning_at_each_such_joint() -> No
     assert found.limit == 5.0
     assert "above the rated torque 5 N m of 'leg'" in found.message
     assert design.accepted
-
-
-def test_of_many_designs_those_that_get_too_hot_are_marked() -> None:
-    many = QUADRUPED.resolve({"actuators.leg.rated_torque": np.array([5.0, 30.0])})
-    found = [f for f in many.findings if f.id == "thermal"]
-    assert [list(np.asarray(f.mask)) for f in found] == [[True, False]] * 2
 
 
 def test_a_payload_below_zero_is_a_joint_above_its_rated_torque_alone() -> None:

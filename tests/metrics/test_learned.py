@@ -37,7 +37,7 @@ def fast(
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pyarrow")
-    monkeypatch.setattr(metrics, "of_policy", fast)
+    monkeypatch.setattr("draft.explore.sweep.of_policy", fast)
 
 
 @needs_learning
@@ -126,7 +126,7 @@ def test_a_sweep_outside_the_region_is_another_sweep(
         asked.append(outside)
         return fast(*args, **options)
 
-    monkeypatch.setattr(metrics, "of_policy", recorded)
+    monkeypatch.setattr("draft.explore.sweep.of_policy", recorded)
     words = ["sweep", "quadruped", "--vary", "thigh_length=0.22:0.3", "--n", "2"]
     words += ["--metrics", "learned.top_speed", "--out", str(tmp_path / "sweep")]
     assert main([*words, "--outside"]) == 0
@@ -176,6 +176,7 @@ def test_a_robot_that_the_policy_cannot_drive_ends_a_sweep_before_it_begins(
     assert not out.exists()
 
 
+@pytest.mark.slow
 @needs_learning
 @pytest.mark.parametrize("policy", [None, str(FAMILY)])
 def test_the_shipped_policy_measures_a_design_and_knows_its_region(policy: str | None) -> None:
@@ -191,6 +192,7 @@ def test_the_shipped_policy_measures_a_design_and_knows_its_region(policy: str |
     assert (np.asarray(found["learned.cost_of_transport"])[:2] > 0).all()
 
 
+@pytest.mark.slow
 @needs_learning
 def test_one_design_has_floats_and_a_refused_one_has_none() -> None:
     pytest.importorskip("mjlab")

@@ -163,23 +163,17 @@ def test_the_published_speed_estimates() -> None:
 # --- robots that lack something ------------------------------------------------------------
 
 
-def test_a_robot_without_legs_has_no_leg_metrics() -> None:
-    chain = leg(shank={"type": "basic", "sphere": None})
-    design = robot(chain).resolve()
-    found = of_design(design)
-    assert {name for name, x in found.items() if not np.isnan(x)} == LEGLESS
-    assert joint_margins(design) == {}
-
-
-def test_many_robots_without_legs_have_none_either() -> None:
+@pytest.mark.parametrize("length", [0.3, np.array([0.2, 0.3, 0.4])], ids=["one", "many"])
+def test_robots_without_legs_have_no_leg_metrics(length: Any) -> None:
     chain = leg(
         thigh={"link": {"axis": "-z", "length": "x", "segment": "thigh"}},
         shank={"type": "basic", "sphere": None},
     )
-    spec = robot(chain, parameters={"x": parameter(0.3)})
-    found = of_design(spec.resolve({"x": np.array([0.2, 0.3, 0.4])}))
-    assert all(np.shape(value) == (3,) for value in found.values())
-    assert np.isnan(found["payload_peak"]).all()
+    design = robot(chain, parameters={"x": parameter(0.3)}).resolve({"x": length})
+    found = of_design(design)
+    assert {name for name, x in found.items() if not np.isnan(x).all()} == LEGLESS
+    assert all(np.shape(value) == np.shape(length) for value in found.values())
+    assert joint_margins(design) == {}
 
 
 def test_a_knee_that_slides_is_none() -> None:

@@ -195,16 +195,6 @@ def errors_of_dynamics(
     return {what: error(one, other) for what, one, other in zip(whats, *found, strict=True)}
 
 
-def assert_same_fields(reference: mujoco.MjModel, model: mujoco.MjModel) -> None:
-    assert_within(TOLERANCE, errors_of_fields(reference, model))
-
-
-def assert_same_dynamics(
-    reference: mujoco.MjModel, model: mujoco.MjModel, rng: np.random.Generator
-) -> None:
-    assert_within(TOLERANCE, errors_of_dynamics(reference, model, rng))
-
-
 def assert_within(tolerance: float, errors: Errors) -> None:
     assert {what: size for what, size in errors.items() if not size <= tolerance} == {}
 
@@ -342,60 +332,70 @@ def test_a_member_that_balances_in_its_middle_is_outside_the_topology() -> None:
     assert batch.outside == {1: "its topology is not the others'"}
 
 
-def test_a_payload_that_may_weigh_nothing_is_part_of_its_body_or_not() -> None:
-    """A geom without mass leaves its body the frame of the other geom."""
-    spec = loaded()
-    batch = spec.resolve({"payload": np.array([0.5, 0.0, 2.0])}).build_batch()
-    assert len(batch) == 3
-    for place in range(3):
-        alone = batch.design[place].build().mujoco
-        assert_same_fields(alone, batch.model(place))
-
-
-def test_turned_frames_and_oblique_axes_are_those_of_mujoco() -> None:
-    chain = leg(
-        thigh={"rpy": ["roll", 0.3, -0.2], "motor": {"actuator": "leg", "axis": [0.1, 1, "roll"]}},
-        shank={
-            "link": {"axis": [0, "roll", -1], "length": 0.25, "segment": "shank"},
-            "joint": {
-                "name": "knee",
-                "axis": ["roll", 1, 0],
-                "range": [-2, "2 + roll"],
-                "actuator": "leg",
-            },
+TURNED = leg(
+    thigh={"rpy": ["roll", 0.3, -0.2], "motor": {"actuator": "leg", "axis": [0.1, 1, "roll"]}},
+    shank={
+        "link": {"axis": [0, "roll", -1], "length": 0.25, "segment": "shank"},
+        "joint": {
+            **{"name": "knee", "axis": ["roll", 1, 0]},
+            **{"range": [-2, "2 + roll"], "actuator": "leg"},
         },
-    )
-    spec = robot(chain, parameters={"roll": parameter(0.1)})
-    batch = spec.resolve({"roll": np.array([0.1, -0.4, 0.0, 1.5, -1.5])}).build_batch()
+    },
+)
+NOTCHED = [[-0.2, -0.1], [0.2, -0.1], [0.2, 0.1], [0.0, "notch"], [-0.2, 0.1]]
+
+
+def sections(end: Any = 0.2, **more: Any) -> dict[str, Any]:
+    """A trunk of two sections, each of them a rectangle unless told otherwise."""
+    shape = more or {"rectangle": [0.2, 0.1]}
+    return {**BOX, "sections": [{"at": at, **shape} for at in (-0.2, end)]}
+
+
+def alone(end: float) -> draft.Spec:
+    """A trunk without limbs."""
+    root = {**sections("end"), "axis": "z"}
+    return robot(children=[], actuators={}, root=root, parameters={"end": parameter(end)})
+
+
+# Where a frame changes with a number: a robot, and its values.
+SPECIAL: dict[str, tuple[draft.Spec, dict[str, list[float]]]] = {
+    # A geom without mass leaves its body the frame of the other geom.
+    "a payload that may weigh nothing": (loaded(), {"payload": [0.5, 0.0, 2.0]}),
+    "turned frames and oblique axes": (
+        robot(TURNED, parameters={"roll": parameter(0.1)}),
+        {"roll": [0.1, -0.4, 0.0, 1.5, -1.5]},
+    ),
+    "a trunk that is not convex": (
+        robot(
+            root=sections("depth", polygon=NOTCHED),
+            parameters={"notch": parameter(0.0), "depth": parameter(0.2)},
+        ),
+        {"notch": [0.0, 0.05, -0.05, 0.15], "depth": [0.2, 0.25, 0.3, 0.1]},
+    ),
+    "a corner cut of zero": (
+        robot(
+            root=sections(rectangle=[0.2, 0.1], chamfer="cut"), parameters={"cut": parameter(0.1)}
+        ),
+        {"cut": [0.1, 0.0, 0.3]},
+    ),
+    # MuJoCo relies on a diagonal M(q) where centre and axes are those of the body.
+    "a trunk alone that is centred after others": (alone(0.3), {"end": [0.3, 0.2, 0.4]}),
+    "a trunk alone that is centred before others": (alone(0.3), {"end": [0.2, 0.3, 0.2]}),
+}
+
+
+@pytest.mark.parametrize(("spec", "values"), SPECIAL.values(), ids=SPECIAL)
+def test_special_frames_are_those_of_mujoco(
+    spec: draft.Spec, values: dict[str, list[float]]
+) -> None:
+    batch = spec.resolve({name: np.array(own) for name, own in values.items()}).build_batch()
     rng = np.random.default_rng(0)
-    assert len(batch) == 5
-    for place in range(5):
-        alone = batch.design[place].build().mujoco
-        assert_same_fields(alone, batch.model(place))
-        assert_same_dynamics(alone, batch.model(place), rng)
-
-
-def test_a_trunk_that_is_not_convex_weighs_what_its_mesh_does() -> None:
-    corners = [[-0.2, -0.1], [0.2, -0.1], [0.2, 0.1], [0.0, "notch"], [-0.2, 0.1]]
-    root = {
-        **BOX,
-        "sections": [{"at": -0.1, "polygon": corners}, {"at": "depth", "polygon": corners}],
-    }
-    spec = robot(root=root, parameters={"notch": parameter(0.0), "depth": parameter(0.2)})
-    values = {"notch": np.array([0.0, 0.05, -0.05, 0.15]), "depth": np.array([0.2, 0.25, 0.3, 0.1])}
-    batch = spec.resolve(values).build_batch()
-    for place in range(len(batch)):
-        alone = batch.design[batch.rows[place]].build().mujoco
-        assert_same_fields(alone, batch.model(place))
-
-
-def test_a_corner_cut_of_zero_changes_no_mass() -> None:
-    sections = [{"at": x, "rectangle": [0.2, 0.1], "chamfer": "cut"} for x in (-0.2, 0.2)]
-    spec = robot(root={**BOX, "sections": sections}, parameters={"cut": parameter(0.1)})
-    batch = spec.resolve({"cut": np.array([0.1, 0.0, 0.3])}).build_batch()
-    assert len(batch) == 3
-    for place in range(3):
-        assert_same_fields(batch.design[place].build().mujoco, batch.model(place))
+    assert {*batch.rows, *batch.outside} == {*range(len(next(iter(values.values()))))}
+    assert batch.outside == {} or not spec.actuators
+    for place, row in enumerate(batch.rows):
+        reference, model = batch.design[row].build().mujoco, batch.model(place)
+        assert_within(TOLERANCE, errors_of_fields(reference, model))
+        assert_within(TOLERANCE, errors_of_dynamics(reference, model, rng))
 
 
 def test_a_trunk_that_twists_is_named() -> None:
@@ -409,25 +409,6 @@ def test_a_trunk_that_twists_is_named() -> None:
     with pytest.raises(DraftError) as alone:
         batch.design[1]
     assert batch.outside[1] == alone.value.problems[0].cause
-
-
-def test_a_body_that_floats_alone_is_not_taken_for_another_of_equal_frames() -> None:
-    """MuJoCo relies on a diagonal M(q) where centre and axes are those of the body."""
-    sections = [{"at": -0.2, "rectangle": [0.2, 0.1]}, {"at": "end", "rectangle": [0.2, 0.1]}]
-    spec = robot(
-        children=[],
-        actuators={},
-        root={**BOX, "axis": "z", "sections": sections},
-        parameters={"end": parameter(0.3)},
-    )
-    for ends in ([0.3, 0.2, 0.4], [0.2, 0.3, 0.2]):
-        batch = spec.resolve({"end": np.array(ends)}).build_batch()
-        assert {*batch.rows, *batch.outside} == {0, 1, 2}
-        rng = np.random.default_rng(0)
-        for place, row in enumerate(batch.rows):
-            alone, model = batch.design[row].build().mujoco, batch.model(place)
-            assert_same_fields(alone, model)
-            assert_same_dynamics(alone, model, rng)
 
 
 def test_a_template_of_another_topology_is_refused() -> None:

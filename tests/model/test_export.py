@@ -23,6 +23,7 @@ from draft.model.shapes import matrix
 from draft.model.urdf import rpy
 from tests.helpers import robot
 from tests.imports.written import joint, link
+from tests.model.shipped import built
 from tests.model.test_slides import sides, telescope
 
 pinocchio = pytest.importorskip("pinocchio")
@@ -30,13 +31,9 @@ trimesh = pytest.importorskip("trimesh")
 SHIPPED = (("quadruped", "bear"), ("quadruped", None), ("humanoid", None), ("hopper", None))
 
 
-def shipped(name: str, design: str | None) -> draft.Model:
-    return draft.load(name).resolve(design).build()
-
-
 @pytest.fixture(scope="module", params=SHIPPED, ids=lambda pair: "-".join(filter(None, pair)))
 def model(request: pytest.FixtureRequest) -> draft.Model:
-    return shipped(*request.param)
+    return built(*request.param)
 
 
 def poses(model: draft.Model, count: int = 6) -> np.ndarray:
@@ -109,8 +106,7 @@ def test_two_readers_find_the_same_inertia(model: draft.Model, tmp_path: Path) -
 
 
 def test_slides_are_prismatic_and_agree(tmp_path: Path) -> None:
-    built = sides([0.3, 0.2, -0.9]).resolve().build()
-    agree(built, tmp_path)
+    agree(sides([0.3, 0.2, -0.9]).resolve().build(), tmp_path)
     root = ElementTree.parse(tmp_path / "out" / "robot.urdf").getroot()
     kinds = {one.get("name"): one.get("type") for one in root.iter("joint")}
     assert kinds["L_piston"] == kinds["R_piston"] == "prismatic"
@@ -134,9 +130,9 @@ def test_an_import_with_canted_axes_agrees(tmp_path: Path) -> None:
     source = tmp_path / "canted.urdf"
     source.write_text(CANTED, encoding="utf-8")
     import_robot(source, tmp_path / "canted", population="quadruped")
-    built = draft.load(tmp_path / "canted").resolve().build()
-    assert any(np.count_nonzero(axis) > 1 for axis in built.mujoco.jnt_axis[1:])
-    agree(built, tmp_path)
+    found = draft.load(tmp_path / "canted").resolve().build()
+    assert any(np.count_nonzero(axis) > 1 for axis in found.mujoco.jnt_axis[1:])
+    agree(found, tmp_path)
 
 
 def test_masses_and_limits_stand_in_the_urdf(model: draft.Model) -> None:
@@ -260,19 +256,19 @@ def test_joints_are_nodes_that_can_be_turned(model: draft.Model, tmp_path: Path)
 
 
 def test_an_export_is_of_one_design_and_keeps_what_is_not_drafts(tmp_path: Path) -> None:
-    built = shipped("hopper", None)
-    folder = built.save(tmp_path / "out", ("urdf", "glb", "mjcf"))
+    hopper = built("hopper", None)
+    folder = hopper.save(tmp_path / "out", ("urdf", "glb", "mjcf"))
     names = {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
     assert names == {
         *("robot.xml", "scene.xml", "design.yaml", "report.json", "robot.urdf"),
         *("actuators.json", "meshes", "meshes/trunk.stl", "robot.glb"),
     }
-    built.save(folder, ("glb",))
+    hopper.save(folder, ("glb",))
     assert {p.name for p in folder.iterdir()} == {"design.yaml", "report.json", "robot.glb"}
-    built.save(folder, ("urdf",))
+    hopper.save(folder, ("urdf",))
     (folder / "meshes" / "mine.stl").write_text("precious")
     with pytest.raises(draft.DraftError, match=r"not a folder of a Draft model .*meshes/mine\.stl"):
-        built.save(folder)
+        hopper.save(folder)
     assert (folder / "meshes" / "mine.stl").read_text() == "precious"
 
 

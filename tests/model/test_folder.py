@@ -134,16 +134,6 @@ def test_a_save_that_fails_halfway_leaves_the_old_model_as_it_was(
         assert _names(tmp_path) == {"out"}
 
 
-def test_without_an_exchange_in_one_step_a_save_still_replaces(
-    model: draft.Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(saving, "_exchange", lambda a, b: False)
-    draft.load("quadruped").resolve("bear").build().save(tmp_path / "out")
-    model.save(tmp_path / "out")
-    assert (tmp_path / "out" / "robot.xml").read_text(encoding="utf-8") == model.xml
-    assert _names(tmp_path) == {"out"}
-
-
 def test_a_folder_of_someone_elses_is_kept(model: draft.Model, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "thesis.txt").write_text("mine")

@@ -19,11 +19,9 @@ from draft.laws.structure import population
 from draft.model import mjcf
 from draft.model.model import preview
 from tests.helpers import leg, robot
+from tests.model.shipped import SHIPPED, built
 
 QUADRUPED = draft.load("quadruped")
-SHIPPED = [
-    (name, design) for name in draft.shipped() for design in (None, *draft.load(name).designs)
-]
 
 
 def inertia(model: mujoco.MjModel, body: str) -> np.ndarray:
@@ -36,8 +34,7 @@ def inertia(model: mujoco.MjModel, body: str) -> np.ndarray:
 
 @pytest.mark.parametrize(("name", "label"), SHIPPED)
 def test_mujoco_weighs_every_body_as_the_design_does(name: str, label: str | None) -> None:
-    design = draft.load(name).resolve(label)
-    model = design.build().mujoco
+    design, model = built(name, label).design, built(name, label).mujoco
     for body, mass in design.body_masses().items():
         assert model.body(body).mass[0] == pytest.approx(mass, rel=1e-6)
     assert model.body_subtreemass[0] == pytest.approx(design.mass, rel=1e-6)

@@ -4,10 +4,7 @@
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
-from importlib.util import find_spec
 from pathlib import Path
 
 import mujoco
@@ -18,16 +15,7 @@ from hypothesis import strategies as st
 
 import draft
 from tests.helpers import DRIVE, leg, robot
-from tests.model.test_masses import SHIPPED
 from tests.written import edit, write_robot
-
-
-@pytest.fixture(
-    params=SHIPPED, ids=lambda pair: f"{pair[0]}-{pair[1] or 'default'}", scope="module"
-)
-def model(request: pytest.FixtureRequest) -> draft.Model:
-    name, label = request.param
-    return draft.load(name).resolve(label).build()
 
 
 def test_every_joint_has_the_numbers_of_the_design(model: draft.Model) -> None:
@@ -177,33 +165,6 @@ def test_a_stated_armature_and_friction_reach_the_joints() -> None:
     # Newer releases keep a column per polynomial term; the first is the linear one.
     assert list(model.dof_damping.reshape(model.nv, -1)[6:, 0]) == [0.05, 0.05]
     assert list(model.dof_frictionloss[6:]) == [0.4, 0.4]
-
-
-_MJLAB = """
-import mujoco, draft
-from mjlab.entity import Entity, EntityCfg
-for name in draft.shipped():
-    design = draft.load(name).resolve()
-    xml = design.build().xml
-    entity = Entity(EntityCfg(spec_fn=lambda: mujoco.MjSpec.from_string(xml)))
-    model = entity.spec.compile()
-    assert list(entity.joint_names) == list(design.joints), entity.joint_names
-    assert list(entity.body_names) == [body.name for body in design.bodies]
-    assert not entity.is_fixed_base
-    assert abs(model.body_subtreemass[0] - design.mass) < 1e-6 * design.mass
-    print(name)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(find_spec("mjlab") is None, reason="mjlab is not installed")
-def test_every_shipped_robot_is_an_mjlab_entity_as_it_is() -> None:
-    # In a process of its own: mjlab brings PyTorch and Warp.
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", _MJLAB], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split()[-len(draft.shipped()) :] == list(draft.shipped())
 
 
 @pytest.mark.parametrize(

@@ -12,17 +12,9 @@ import pytest
 
 import draft
 from tests.helpers import DRIVE, leg, robot
-from tests.model.test_masses import SHIPPED
+from tests.model.shipped import built
 
 QUADRUPEDS = [None, *draft.load("quadruped").designs]
-
-
-@pytest.fixture(
-    params=SHIPPED, ids=lambda pair: f"{pair[0]}-{pair[1] or 'default'}", scope="module"
-)
-def model(request: pytest.FixtureRequest) -> draft.Model:
-    name, label = request.param
-    return draft.load(name).resolve(label).build()
 
 
 def _at_home(scene: mujoco.MjModel) -> mujoco.MjData:
@@ -91,7 +83,7 @@ def test_home_targets_stay_in_the_joints_ranges(model: draft.Model) -> None:
 
 @pytest.mark.parametrize("label", QUADRUPEDS)
 def test_a_quadruped_stands_for_five_seconds_under_its_own_servos(label: str | None) -> None:
-    scene = draft.load("quadruped").resolve(label).build().scene()
+    scene = built("quadruped", label).scene()
     data = _at_home(scene)
     height = data.qpos[2]
     worst = 0.0

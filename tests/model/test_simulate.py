@@ -19,7 +19,7 @@ from draft.cli import main
 from draft.model import simulate as simulation
 from draft.values import scalar
 from tests.helpers import ids, leg, robot
-from tests.model.test_masses import SHIPPED
+from tests.model.shipped import SHIPPED, built
 
 SIMULATED = {"start_penetration", "unstable_servo", "weak_servo", "falls"}
 
@@ -38,10 +38,7 @@ def simulated(spec: draft.Spec, **values: Any) -> dict[str, draft.Finding]:
 
 @pytest.mark.parametrize(("name", "design"), SHIPPED)
 def test_shipped_robots_stand_except_the_one_on_one_leg(name: str, design: str | None) -> None:
-    found = simulated(draft.load(name)) if design is None else None
-    if found is None:
-        resolved = draft.load(name).resolve(design).build().simulate()
-        found = {f.id: f for f in resolved.findings if f.id in SIMULATED}
+    found = {one.id: one for one in built(name, design).simulate().findings if one.id in SIMULATED}
     assert set(found) == ({"falls"} if name == "hopper" else set())
     if name == "hopper":
         assert "one point takes a controller" in found["falls"].message

@@ -4,8 +4,6 @@
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
-from functools import cache
-
 import mujoco
 import numpy as np
 import pytest
@@ -14,6 +12,7 @@ from hypothesis import strategies as st
 
 import draft
 from tests.helpers import leg, parameter, robot
+from tests.model.shipped import built
 from tests.model.test_masses import inertia
 
 # Robot, mirror plane, and what a prefix on one side is on the other.
@@ -23,25 +22,13 @@ MIRRORS = [
     ("humanoid", "y", {"left_": "right_"}),
 ]
 CASES = [
-    pytest.param(
-        name,
-        plane,
-        sides,
-        label,
-        id=f"{name}-{label or 'default'}-{plane}",
-        marks=pytest.mark.skipif(name not in draft.shipped(), reason=f"no {name}"),
-    )
+    pytest.param(name, plane, sides, label, id=f"{name}-{label or 'default'}-{plane}")
     for name, plane, sides in MIRRORS
-    for label in (None, *(draft.load(name).designs if name in draft.shipped() else ()))
+    for label in (None, *draft.load(name).designs)
 ]
 PLANES = {"x": np.diag([-1.0, 1.0, 1.0]), "y": np.diag([1.0, -1.0, 1.0])}
 # Turning about the mirror's normal looks the same in it, turning about the others reversed.
 SENSE = {"x": np.array([1.0, -1.0, -1.0]), "y": np.array([-1.0, 1.0, -1.0])}
-
-
-@cache
-def _built(name: str, label: str | None) -> mujoco.MjModel:
-    return draft.load(name).resolve(label).build().mujoco
 
 
 def _other(name: str, sides: dict[str, str]) -> str:
@@ -56,7 +43,7 @@ def _other(name: str, sides: dict[str, str]) -> str:
 def test_both_sides_weigh_the_same_and_mirror_each_others_inertia(
     name: str, plane: str, sides: dict[str, str], label: str | None
 ) -> None:
-    model, mirror = _built(name, label), PLANES[plane]
+    model, mirror = built(name, label).mujoco, PLANES[plane]
     for i in range(1, model.nbody):
         one = model.body(i)
         two = model.body(_other(one.name, sides))
@@ -89,7 +76,7 @@ def _mirrored_angles(
 def test_mirrored_angles_put_every_body_at_its_mirror_image(
     name: str, plane: str, sides: dict[str, str], label: str | None, seed: int
 ) -> None:
-    model, mirror = _built(name, label), PLANES[plane]
+    model, mirror = built(name, label).mujoco, PLANES[plane]
     low, high = model.jnt_range[1:].T
     # Beyond the ranges too: they need not be mirror images of each other.
     angles = np.random.default_rng(seed).uniform(np.minimum(low, -1), np.maximum(high, 1))
@@ -110,7 +97,7 @@ def test_mirrored_angles_put_every_body_at_its_mirror_image(
 def test_one_sign_means_one_motion_on_every_copy_of_a_joint(
     name: str, plane: str, sides: dict[str, str], label: str | None
 ) -> None:
-    model = _built(name, label)
+    model = built(name, label).mujoco
     for j in range(1, model.njnt):
         one = model.joint(j)
         two = model.joint(_other(one.name, sides))
@@ -118,9 +105,8 @@ def test_one_sign_means_one_motion_on_every_copy_of_a_joint(
         assert list(two.range) == list(one.range)
 
 
-@pytest.mark.skipif("humanoid" not in draft.shipped(), reason="no humanoid")
 def test_the_halves_of_a_humanoid_lie_on_their_own_sides() -> None:
-    model = _built("humanoid", None)
+    model = built("humanoid", None).mujoco
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     for i in range(1, model.nbody):

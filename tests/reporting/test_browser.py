@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,39 +12,81 @@ import pytest
 
 from benchmarks.browser import tab as new_tab
 from draft.design.references import open_designs
+from draft.reporting import dots
 from draft.reporting.page import page
 from draft.reporting.subjects import Subject, subjects
 
 pytest.importorskip("plotly")
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (2200, 1000), (390, 800)])
-def test_the_page_opens_offline_and_draws(
-    size: tuple[int, int], three: list[Subject], tmp_path: Path, browser: Any
-) -> None:
-    path = tmp_path / "report.html"
-    path.write_text(page(three), encoding="utf-8")
+@pytest.fixture
+def opened(tmp_path: Path, browser: Any) -> Iterator[Callable[[list[Subject]], Any]]:
+    """Open a report without a network; nothing may be fetched or complained of."""
     said: list[str] = []
     asked: list[str] = []
-    tab = new_tab(browser, offline=True, viewport={"width": size[0], "height": size[1]})
+    tab = new_tab(browser, offline=True, viewport={"width": 1280, "height": 720})
     tab.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
     tab.on("pageerror", lambda error: said.append(str(error)))
     tab.on("request", lambda request: asked.append(request.url))
-    tab.goto(path.as_uri())
-    tab.wait_for_function("document.querySelectorAll('.plot .main-svg').length >= 3")
-    plots = tab.evaluate("[...document.querySelectorAll('.plot')].map(p => p.data.length)")
-    lost = tab.evaluate(
-        "[...document.querySelectorAll('.plot')].filter(p => /WebGL is not/.test(p.innerText))"
-        ".length"
-    )
-    wide = tab.evaluate("document.documentElement.scrollWidth - innerWidth")
-    tab.context.close()
+
+    def show(found: list[Subject]) -> Any:
+        path = tmp_path / "report.html"
+        path.write_text(page(found), encoding="utf-8")
+        tab.goto(path.as_uri())
+        return tab
+
+    yield show
     assert said == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
-    assert all(plots)
-    assert len(plots) >= 3
-    assert lost == 0
-    assert wide <= 0
+    tab.context.close()
+
+
+def beyond(tab: Any) -> int:
+    """Pixels by which the page is wider than its window."""
+    return tab.evaluate("document.documentElement.scrollWidth - innerWidth")
+
+
+def test_the_page_opens_offline_and_draws(
+    three: list[Subject], opened: Callable[[list[Subject]], Any]
+) -> None:
+    tab = opened(three)
+    tab.wait_for_function("document.querySelectorAll('.plot .main-svg').length >= 3")
+    for width, height in ((1280, 720), (2200, 1000), (390, 800)):
+        tab.set_viewport_size({"width": width, "height": height})
+        plots = tab.evaluate("[...document.querySelectorAll('.plot')].map(p => p.data.length)")
+        assert all(plots)
+        assert len(plots) >= 3
+        assert beyond(tab) <= 0
+    lost = "[...document.querySelectorAll('.plot')].filter(p => /WebGL is not/.test(p.innerText))"
+    assert tab.evaluate(f"{lost}.length") == 0
+
+
+LOOK = """() => [...document.querySelectorAll('.dots .row')].map((row) => ({
+  ends: [...row.querySelectorAll('span')].map((span) => span.innerText),
+  dots: [...row.querySelectorAll('i')].map((dot) => {
+    const box = dot.getBoundingClientRect();
+    return [box.x, box.y, box.width, box.height];
+  })}))"""
+
+
+@pytest.mark.parametrize("count", [2, 8])
+def test_no_dot_covers_another(count: int, opened: Callable[[list[Subject]], Any]) -> None:
+    names = ["quadruped:cheetah", "quadruped:bear", "humanoid", "quadruped:giraffe", "hopper"]
+    found = subjects(open_designs((names * 2)[:count]))
+    tab = opened(found)
+    for width in (1280, 400):
+        tab.set_viewport_size({"width": width, "height": 800})
+        rows = tab.evaluate(LOOK)
+        assert beyond(tab) <= 0
+        assert len(rows) == len(dots.metrics(found)) + len(dots.parameters(found))
+        for row in rows:
+            assert len(row["ends"]) == 2
+            boxes = np.array(row["dots"])
+            assert (boxes[:, 0] >= 0).all()
+            assert (boxes[:, 0] + boxes[:, 2] <= width).all()
+            centres = boxes[:, :2] + boxes[:, 2:] / 2
+            away = np.linalg.norm(centres[:, None] - centres[None], axis=2)
+            assert away[~np.eye(len(boxes), dtype=bool)].min() >= boxes[0, 2] - 0.5
 
 
 PLACES = """() => document.getElementById('plot-robots').data
@@ -68,19 +111,9 @@ def lowest_foot(found: list[Subject], time: float) -> float:
     return float(min(heights))
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_robots_walk_offline_until_they_are_paused(
-    scheme: str, tmp_path: Path, browser: Any
-) -> None:
-    path = tmp_path / "report.html"
+def test_the_robots_walk_until_they_are_paused(opened: Callable[[list[Subject]], Any]) -> None:
     found = subjects(open_designs(["cheetah", "bear", "giraffe"]), walk=True)
-    path.write_text(page(found), encoding="utf-8")
-    said: list[str] = []
-    size = {"width": 1280, "height": 720}
-    tab = new_tab(browser, offline=True, viewport=size, color_scheme=scheme)
-    tab.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
-    tab.on("pageerror", lambda error: said.append(str(error)))
-    tab.goto(path.as_uri())
+    tab = opened(found)
     tab.wait_for_function(f"({PLACES})().length > 0")
     before = tab.evaluate(PLACES)
     tab.wait_for_function(f"(old) => ({PLACES})().every((x, i) => x !== old[i])", arg=before)
@@ -88,20 +121,18 @@ def test_the_robots_walk_offline_until_they_are_paused(
     assert button.inner_text() == "Pause"
     button.click()
     assert button.inner_text() == "Play"
-    tab.evaluate("draftWalk.draw(1.0)")
-    first = tab.evaluate(PLACES)
-    tab.evaluate("draftWalk.draw(1.2)")
-    second = tab.evaluate(PLACES)
-    lowest = tab.evaluate(
-        "Math.min(...document.getElementById('plot-robots').data"
-        ".filter((t) => t.type === 'mesh3d' && t.z.length).flatMap((t) => [...t.z]))"
-    )
+    for scheme in ("light", "dark"):
+        tab.emulate_media(color_scheme=scheme)
+        tab.evaluate("draftWalk.draw(1.0)")
+        first = tab.evaluate(PLACES)
+        tab.evaluate("draftWalk.draw(1.2)")
+        assert tab.evaluate(PLACES) != first
+        lowest = tab.evaluate(
+            "Math.min(...document.getElementById('plot-robots').data"
+            ".filter((t) => t.type === 'mesh3d' && t.z.length).flatMap((t) => [...t.z]))"
+        )
+        # The page moves the vertices as MuJoCo moved the feet, which are drawn as polyhedra.
+        assert lowest == pytest.approx(lowest_foot(found, 1.2), abs=2e-3)
     tab.locator("#walk-speed").fill("0.5")
     assert tab.inner_text("#walk-shown") == "0.5 ×"
-    wide = tab.evaluate("document.documentElement.scrollWidth - innerWidth")
-    tab.context.close()
-    assert said == []
-    assert first != second
-    # The page moves the vertices as MuJoCo moved the feet, which are drawn as polyhedra.
-    assert lowest == pytest.approx(lowest_foot(found, 1.2), abs=2e-3)
-    assert wide <= 0
+    assert beyond(tab) <= 0

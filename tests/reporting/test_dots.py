@@ -1,22 +1,17 @@
-"""Dot plot of a report: what stands where, for 2 to 12 designs, in wide and narrow windows."""
+"""Dot plot of a report: what stands where, for 2 to 12 designs."""
 
 from __future__ import annotations
 
 import math
 from itertools import pairwise
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from benchmarks.browser import tab as new_tab
-from draft.design.references import open_designs
 from draft.metrics import METRICS
 from draft.reporting import dots
 from draft.reporting.dots import Row
-from draft.reporting.page import page
-from draft.reporting.subjects import Subject, subjects
+from draft.reporting.subjects import Subject
 from draft.reporting.tables import number
 
 pytest.importorskip("plotly")
@@ -65,38 +60,3 @@ def test_titles_are_words_and_nothing_else(three: list[Subject]) -> None:
     text = dots.plot(found, [Row(hostile, "kg", "", [1.0, 2.0, math.nan])])
     assert "<img" not in text
     assert text.count('"') % 2 == 0
-
-
-LOOK = """() => [...document.querySelectorAll('.dots .row')].map((row) => ({
-  ends: [...row.querySelectorAll('span')].map((span) => span.innerText),
-  dots: [...row.querySelectorAll('i')].map((dot) => {
-    const box = dot.getBoundingClientRect();
-    return [box.x, box.y, box.width, box.height];
-  })}))"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("width", [1280, 400])
-@pytest.mark.parametrize("count", [2, 8])
-def test_no_dot_covers_another_in_the_browser(
-    width: int, count: int, tmp_path: Path, browser: Any
-) -> None:
-    names = ["quadruped:cheetah", "quadruped:bear", "humanoid", "quadruped:giraffe", "hopper"]
-    found = subjects(open_designs((names * 2)[:count]))
-    path = tmp_path / "report.html"
-    path.write_text(page(found), encoding="utf-8")
-    tab = new_tab(browser, offline=True, viewport={"width": width, "height": 800})
-    tab.goto(path.as_uri())
-    rows = tab.evaluate(LOOK)
-    wide = tab.evaluate("document.documentElement.scrollWidth - innerWidth")
-    tab.context.close()
-    assert wide <= 0
-    assert len(rows) == len(dots.metrics(found)) + len(dots.parameters(found))
-    for row in rows:
-        assert len(row["ends"]) == 2
-        boxes = np.array(row["dots"])
-        assert (boxes[:, 0] >= 0).all()
-        assert (boxes[:, 0] + boxes[:, 2] <= width).all()
-        centres = boxes[:, :2] + boxes[:, 2:] / 2
-        away = np.linalg.norm(centres[:, None] - centres[None], axis=2)
-        assert away[~np.eye(len(boxes), dtype=bool)].min() >= boxes[0, 2] - 0.5

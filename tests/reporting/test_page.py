@@ -5,10 +5,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
-import sys
 from html import unescape
 from html.parser import HTMLParser
-from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
@@ -16,7 +14,6 @@ import pytest
 
 import draft
 from draft.errors import DraftError
-from draft.extras import remedy
 from draft.metrics import METRICS, Metric
 from draft.reporting.page import page
 from draft.reporting.subjects import Subject, subjects
@@ -96,16 +93,15 @@ def test_the_page_names_every_design_with_its_mass_and_findings(
         assert name in words
 
 
-def test_the_page_is_sound_and_its_ids_are_unique(text: str) -> None:
+def test_the_page_is_sound_the_same_every_time_and_loads_nothing(
+    text: str, three: list[Subject]
+) -> None:
+    assert page(three) == text
     reader = read(text)
     assert len(set(reader.ids)) == len(reader.ids)
     figures = json.loads(reader.scripts["draft-figures"])
     assert {f"plot-{name}" for name in figures} <= set(reader.ids)
     assert {"robots", "masses", "trends"} <= set(figures)
-
-
-def test_the_page_loads_nothing(text: str) -> None:
-    reader = read(text)
     assert reader.loads == ["data:,"]
     assert reader.handlers == []
     assert "Content-Security-Policy" in text
@@ -115,6 +111,14 @@ def test_the_page_loads_nothing(text: str) -> None:
     data = json.loads(reader.scripts["draft-report"])
     own = [reader.scripts["draft-figures"], json.dumps(_without_sources(data))]
     assert not any(re.search(r"https?://", script) for script in own)
+    # The robots have one scale.
+    layout = figures["robots"]["layout"]["scene"]
+    scales = {
+        round(layout["aspectratio"][k] / (high - low), 9)
+        for k in "xyz"
+        for low, high in [layout[f"{k}axis"]["range"]]
+    }
+    assert len(scales) == 1
 
 
 def _without_sources(data: Any) -> Any:
@@ -131,32 +135,14 @@ def test_scripts_can_read_the_reports_in_the_page(text: str, three: list[Subject
         assert data["designs"][subject.title]["mass_kg"] == subject.design.mass
 
 
-def test_the_robots_have_one_scale(text: str) -> None:
-    layout = json.loads(read(text).scripts["draft-figures"])["robots"]["layout"]["scene"]
-    scales = {
-        round(layout["aspectratio"][k] / (high - low), 9)
-        for k in "xyz"
-        for low, high in [layout[f"{k}axis"]["range"]]
-    }
-    assert len(scales) == 1
-
-
 def hostile() -> Subject:
     """A robot whose every text is hostile."""
-    declared = parameter(0.3)
-    declared |= {"doc": HOSTILE}
-    spec = robot(parameters={"long": declared})
-    spec = dataclasses.replace(spec, doc=HOSTILE, name=HOSTILE)
-    design = spec.resolve()
-    finding = dataclasses.replace(
-        _finding(), where=HOSTILE, text=HOSTILE.replace("{", ""), source=HOSTILE
-    )
+    spec = robot(parameters={"long": parameter(0.3) | {"doc": HOSTILE}})
+    design = dataclasses.replace(spec, doc=HOSTILE, name=HOSTILE).resolve()
+    finding = draft.load("quadruped").resolve("giraffe").findings[0]
+    finding = dataclasses.replace(finding, where=HOSTILE, text=HOSTILE, source=HOSTILE)
     design = dataclasses.replace(design, label=HOSTILE, findings=(finding,))
     return subjects([design, design])[1]
-
-
-def _finding() -> Any:
-    return draft.load("quadruped").resolve("giraffe").findings[0]
 
 
 def test_hostile_texts_are_words_and_nothing_else() -> None:
@@ -208,43 +194,21 @@ def test_metrics_are_compared() -> None:
     assert json.loads(reader.scripts["draft-report"])["metrics"]["cheetah"]["nowhere"] is None
 
 
-def test_without_the_extra_the_page_says_how_to_get_it(
-    three: list[Subject], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "plotly", None)
-    with pytest.raises(DraftError, match=re.escape(remedy("report"))):
-        page(three)
-
-
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        (33.61, "33.6"),
-        (0.0198, "0.0198"),
-        (1.0, "1.00"),
-        (1272.3, "1272"),
-        (112.74, "113"),
-        (999.6, "1000"),
-        (2.5e-6, "2.50e-06"),
-        (0.0, "0"),
-        (float("nan"), "–"),
-        (-3.25, "-3.25"),
+        *((33.61, "33.6"), (0.0198, "0.0198"), (1.0, "1.00"), (1272.3, "1272"), (112.74, "113")),
+        *((999.6, "1000"), (2.5e-6, "2.50e-06"), (0.0, "0"), (float("nan"), "–"), (-3.25, "-3.25")),
     ],
 )
 def test_numbers_have_three_digits(value: float, words: str) -> None:
     assert number(value) == words
 
 
-def test_the_page_of_many_is_refused() -> None:
-    spec = draft.load("hopper")
-    with pytest.raises(DraftError, match="1 to 12 designs"):
-        subjects([spec.resolve()] * 13)
-    with pytest.raises(DraftError, match="1 to 12 designs"):
-        subjects([])
-
-
-def test_pages_are_the_same_every_time(three: list[Subject], text: str, tmp_path: Path) -> None:
-    assert page(three) == text
+def test_the_page_of_none_or_many_is_refused() -> None:
+    for count in (0, 13):
+        with pytest.raises(DraftError, match="1 to 12 designs"):
+            subjects([draft.load("hopper").resolve()] * count)
 
 
 def test_rated_torque_is_in_the_table_of_actuators(three: list[Subject]) -> None:

@@ -38,32 +38,10 @@ def test_a_word_is_a_spec_a_design_a_file_or_a_saved_model() -> None:
     ]
 
 
-def test_a_shipped_design_is_known_by_its_name_alone() -> None:
-    (design,) = open_designs(["bear"])
-    assert (design.name, design.label) == ("quadruped", "bear")
-    with pytest.raises(DraftError, match="cheetah"):
-        open_designs(["chetah"])
-
-
 def test_titles_of_one_robot_are_its_designs() -> None:
     found = subjects(open_designs(["monoped", "monoped:long", "monoped:long"]))
     assert [subject.title for subject in found] == ["default", "long", "long 2"]
     assert len({subject.color for subject in found}) == 3
-
-
-@pytest.mark.parametrize(
-    ("word", "words"),
-    [
-        ("nobody", r"names no robot or design\n  available: bear, .*monoped, quadruped"),
-        ("monoped:nobody", "has no design 'nobody'"),
-        ("monoped:", "names no design"),
-        (":long", "no robot is named"),
-        ("monoped:missing.yaml", "missing.yaml"),
-    ],
-)
-def test_a_word_that_names_nothing_is_explained(word: str, words: str) -> None:
-    with pytest.raises(DraftError, match=words):
-        open_designs([word])
 
 
 def test_a_saved_model_of_an_unknown_robot_is_explained() -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import logging
 import os
 import sys
-from collections.abc import Coroutine, Iterator
+import warnings
+from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
@@ -122,33 +124,38 @@ def test_lines_about_garbage_come_once_a_minute_and_faults_of_ours_always() -> N
     now = [0.0]
     once = OnePerMinute(lambda: now[0])
 
-    def record(fault: Exception | None) -> logging.LogRecord:
-        try:
-            if fault:
-                ws_handler(fault)
-        except Exception:
-            exc = sys.exc_info()
-            return logging.LogRecord("x", logging.ERROR, "", 0, "failed", (), exc)
-        try:
-            _message_consumer()
-        except Exception:
-            return logging.LogRecord("x", logging.ERROR, "", 0, "failed", (), sys.exc_info())
-        raise AssertionError
-
     def ws_handler(fault: Exception) -> None:
         raise fault
 
     def _message_consumer() -> None:
         raise ValueError("unreadable")
 
-    assert once.filter(record(None))
-    assert [once.filter(record(None)) for _ in range(5)] == [False] * 5
-    assert once.filter(record(KeyError("ours")))
+    def record(raises: Callable[[], None]) -> logging.LogRecord:
+        try:
+            raises()
+        except Exception:
+            return logging.LogRecord("x", logging.ERROR, "", 0, "failed", (), sys.exc_info())
+        raise AssertionError
+
+    garbage = functools.partial(record, _message_consumer)
+    assert once.filter(garbage())
+    assert [once.filter(garbage()) for _ in range(5)] == [False] * 5
+    assert once.filter(record(lambda: ws_handler(KeyError("ours"))))
     now[0] = 61.0
-    last = record(None)
+    last = garbage()
     assert once.filter(last)
     assert last.getMessage().endswith("(5 more since the last such line)")
     assert last.exc_info is None
+
+
+def test_what_comes_too_late_for_a_closed_tab_is_dropped_in_silence() -> None:
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        server = Server("127.0.0.1", 0)
+        shown = server.viser.gui.add_number("speed", 0.0)
+        server.close()
+        shown.value = 1.0
+    assert [str(one.message) for one in seen if "closed connection" in str(one.message)] == []
 
 
 def test_a_viser_that_cannot_be_guarded_is_refused() -> None:

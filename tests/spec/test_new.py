@@ -76,18 +76,6 @@ def test_a_name_that_cannot_be_is_refused(tmp_path: Path, name: str) -> None:
     assert files_below(tmp_path) == set()
 
 
-def test_a_shipped_name_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="'quadruped' is a shipped robot"):
-        new_robot(tmp_path / "quadruped", "quadruped")
-    assert files_below(tmp_path) == set()
-
-
-def test_an_unknown_robot_to_start_from_names_the_nearest(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="no shipped robot 'quadropod'\n  did you mean 'quadruped'"):
-        new_robot(tmp_path / "mine", "quadropod")
-    assert files_below(tmp_path) == set()
-
-
 def test_an_interrupt_leaves_nothing_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

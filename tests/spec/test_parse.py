@@ -13,6 +13,7 @@ import yaml
 import draft
 from draft.spec.load import ROBOTS
 from tests.helpers import BOX
+from tests.model.shipped import built
 
 PARAMETERS = "name: crate\npopulation: quadruped\nparameters: {}\nactuators: {}\n"
 TREE = {"tree": {"name": "trunk", "type": "root"}}
@@ -42,9 +43,9 @@ def test_texts_and_mappings_give_the_spec_of_the_folder(name: str) -> None:
         assert spec.folder is None
         assert list(spec.designs) == list(folder.designs)
         for design in (None, *spec.designs):
-            mine, theirs = spec.resolve(design), folder.resolve(design)
-            assert mine.build().xml == theirs.build().xml
-            assert [str(f) for f in mine.findings] == [str(f) for f in theirs.findings]
+            mine, theirs = spec.resolve(design), built(name, design)
+            assert mine.build().xml == theirs.xml
+            assert [str(f) for f in mine.findings] == [str(f) for f in theirs.design.findings]
 
 
 def test_an_error_in_a_text_has_the_line_that_it_has_in_the_folder(tmp_path: Path) -> None:

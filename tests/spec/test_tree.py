@@ -135,106 +135,6 @@ def test_without_at_a_link_stands_at_its_parents_tip(robot: Path) -> None:
     assert bodies[3].position == pytest.approx((0, 0, -0.30))
 
 
-def test_a_chain_that_contains_itself_is_shown_with_its_way(robot: Path) -> None:
-    edit(
-        robot,
-        "tree.yaml",
-        "tree:\n",
-        "  a:\n    - {name: one, children: [{chain: b}]}\n  b:\n    - {chain: a}\ntree:\n",
-    )
-    hang(robot, "{chain: a}")
-    problem = only_problem(robot)
-    assert problem.cause == "a chain contains itself: a -> b -> a"
-    assert str(problem.where) == "robot/tree.yaml:17:15"
-
-
-def test_an_unknown_chain_names_the_nearest(robot: Path) -> None:
-    hang(robot, "{chain: legs}")
-    problem = only_problem(robot)
-    assert problem.cause == "there is no chain 'legs'"
-    assert problem.remedy.startswith("did you mean 'leg'?")
-    assert str(problem.where) == "robot/tree.yaml:18:15"
-
-
-def test_a_chain_used_twice_under_one_prefix_is_one_problem(robot: Path) -> None:
-    hang(robot, "{chain: leg}", "{chain: leg, mirror: y}")
-    problem = only_problem(robot)
-    assert problem.cause == "chain 'leg' is used twice with prefix ''"
-    assert str(problem.where) == "robot/tree.yaml:19:15"
-    assert "robot/tree.yaml:18:15" in problem.remedy
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "cause", "where"),
-    [
-        ("name: shank\n", "name: thigh\n", "two links are called 'thigh'", "9:13"),
-        ("name: knee", "name: hip", "two joints are called 'hip'", "11:21"),
-        ("site: foot", "site: imu", "two sites are called 'imu'", "13:43"),
-        ("name: trunk", "name: shank", "two links are called 'shank'", "9:13"),
-    ],
-)
-def test_two_things_of_one_name_are_named_at_the_second(
-    robot: Path, old: str, new: str, cause: str, where: str
-) -> None:
-    edit(robot, "tree.yaml", old, new)
-    problem = only_problem(robot)
-    assert problem.cause == cause
-    assert str(problem.where) == f"robot/tree.yaml:{where}"
-    assert "the other is at robot/tree.yaml:" in problem.remedy
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "name", "where"),
-    [
-        ("name: shank\n", "name: world\n", "world", "9:13"),
-        ("name: trunk", "name: world", "world", "15:9"),
-        ("name: knee", "name: floating_base", "floating_base", "11:21"),
-    ],
-)
-def test_names_that_every_model_has_are_taken(
-    robot: Path, old: str, new: str, name: str, where: str
-) -> None:
-    edit(robot, "tree.yaml", old, new)
-    problem = only_problem(robot)
-    assert problem.cause == f"every model already has '{name}'"
-    assert str(problem.where) == f"robot/tree.yaml:{where}"
-
-
-def test_an_unknown_actuator_of_a_motor_names_the_nearest(robot: Path) -> None:
-    edit(robot, "tree.yaml", "motor: {actuator: leg, axis: x}", "motor: {actuator: legg, axis: x}")
-    problem = only_problem(robot)
-    assert "motor of 'housing' uses actuator class 'legg'" in problem.cause
-    assert problem.remedy.startswith("did you mean 'leg'?")
-    assert str(problem.where) == "robot/tree.yaml:4:25"
-
-
-def test_an_unknown_actuator_of_a_joint_names_the_nearest(robot: Path) -> None:
-    edit(robot, "tree.yaml", "range: [-1.0, 1.0], actuator: leg", "range: [-1, 1], actuator: lge")
-    problem = only_problem(robot)
-    assert "joint 'hip' of 'thigh' uses actuator class 'lge'" in problem.cause
-    assert problem.remedy.startswith("did you mean 'leg'?")
-    assert str(problem.where) == "robot/tree.yaml:6:61"
-
-
-def test_a_motor_without_a_joint_is_named(robot: Path) -> None:
-    edit(
-        robot,
-        "tree.yaml",
-        "      sphere: {",
-        "      motor: {actuator: leg, axis: y}\n      sphere: {",
-    )
-    problem = only_problem(robot)
-    assert problem.cause == "the motor on 'shank' drives no joint"
-    assert str(problem.where) == "robot/tree.yaml:13:25"
-
-
-def test_a_joint_without_a_motor_is_named(robot: Path) -> None:
-    edit(robot, "tree.yaml", "      motor: {actuator: leg, axis: y}\n", "")
-    problem = only_problem(robot)
-    assert problem.cause == "no motor drives joint 'knee'"
-    assert str(problem.where) == "robot/tree.yaml:10:66"
-
-
 def test_a_passive_joint_needs_no_motor(robot: Path) -> None:
     edit(robot, "tree.yaml", "      motor: {actuator: leg, axis: y}\n", "")
     edit(robot, "tree.yaml", "range: [-2.0, 2.0], actuator: leg}", "range: [-2.0, 2.0]}")
@@ -319,45 +219,12 @@ def test_of_thousands_of_unknown_keys_of_a_design_the_first_few_are_shown(
     assert len(caught.value.problems) == 13
 
 
-def test_parameters_in_a_circle_are_shown_with_their_way(robot: Path) -> None:
-    for name, other in (("thigh_length", "shank_length"), ("shank_length", "trunk_length")):
-        line = {"thigh_length": "0.30", "shank_length": "0.25"}[name]
-        edit(robot, "parameters.yaml", f"{name}: {{value: {line}", f"{name}: {{value: 2 * {other}")
-    edit(robot, "parameters.yaml", "{value: 0.40", "{value: thigh_length")
-    problem = only_problem(robot)
-    assert problem.cause == (
-        "these depend on each other in a cycle: "
-        "thigh_length -> shank_length -> trunk_length -> thigh_length"
-    )
-    assert str(problem.where) == "robot/parameters.yaml:5:3"
-
-
 def test_of_a_long_circle_the_ends_are_shown(robot: Path) -> None:
     many = "".join(f"  p{i}: {{value: p{(i + 1) % 99}, unit: m, doc: A.}}\n" for i in range(99))
     edit(robot, "parameters.yaml", "actuators:\n", many + "actuators:\n")
     cause = only_problem(robot).cause
     assert cause.count(" -> ") == 15
     assert " -> ... -> " in cause
-
-
-def test_a_circle_through_an_actuator_is_shown(robot: Path) -> None:
-    edit(robot, "parameters.yaml", "peak_torque: 60", "peak_torque: 900 * foot_radius")
-    problem = only_problem(robot)
-    assert problem.cause == (
-        "these depend on each other in a cycle: foot_radius -> leg -> foot_radius"
-    )
-    assert str(problem.where) == "robot/parameters.yaml:8:3"
-
-
-def test_a_circle_made_by_a_value_is_shown(robot: Path) -> None:
-    spec = draft.load(robot)
-    with pytest.raises(draft.DraftError, match="cycle: foot_radius -> leg -> foot_radius"):
-        spec.resolve({"actuators.leg.peak_torque": "1000 * foot_radius"})
-
-
-def test_a_name_that_needs_itself_is_a_circle(robot: Path) -> None:
-    edit(robot, "parameters.yaml", "{value: 0.40", "{value: 1 + trunk_length")
-    assert only_problem(robot).cause.endswith("in a cycle: trunk_length -> trunk_length")
 
 
 def test_a_chain_that_is_not_used_may_be_there(robot: Path) -> None:
@@ -390,10 +257,3 @@ def test_a_use_may_change_the_joints_of_its_chain(robot: Path) -> None:
     knee = bodies["R_shank"].joint
     assert knee is not None
     assert knee.home == 0.3
-
-
-def test_a_use_cannot_change_a_joint_that_its_chain_lacks(robot: Path) -> None:
-    hang(robot, "{chain: leg, prefix: L_, joints: {hop: {reverse: true}}}")
-    problem = only_problem(robot)
-    assert problem.cause == "chain 'leg' has no joint 'hop' to change"
-    assert "did you mean 'hip'?" in problem.remedy

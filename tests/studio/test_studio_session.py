@@ -42,6 +42,12 @@ def session(folder: Path, clock: Clock | None = None, base: str = "") -> Session
     return Session(Library(quadruped(), folder), Point(base), clock or Clock())
 
 
+@pytest.fixture
+def s(tmp_path: Path) -> Session:
+    """A tab with the quadruped, whose designs are saved to a folder of its own."""
+    return session(tmp_path / "designs")
+
+
 ACTIONS = st.lists(
     st.one_of(
         st.tuples(st.just("set"), st.sampled_from(["thigh_length", "crouch"]), st.floats(-1, 3)),
@@ -66,6 +72,7 @@ def act(s: Session, clock: Clock, action: tuple) -> None:
         {**calls, "undo": s.undo, "redo": s.redo}[kind](*rest)
 
 
+@pytest.mark.slow
 @given(ACTIONS)
 def test_undo_after_anything_leads_back_and_redo_forth(
     tmp_path_factory: pytest.TempPathFactory, actions: list[tuple]
@@ -105,8 +112,7 @@ def test_a_saved_design_comes_back_as_it_was(
     assert quadruped().resolve(folder / "longer.yaml").mass == mass
 
 
-def test_a_bad_value_says_why_and_keeps_the_last_good_robot(tmp_path: Path) -> None:
-    s = session(tmp_path)
+def test_a_bad_value_says_why_and_keeps_the_last_good_robot(s: Session) -> None:
     assert s.set("thigh_length", 0.3)
     good = s.shown
     assert not s.set("thigh_length", 50.0)
@@ -134,8 +140,7 @@ def test_a_drag_is_one_step_of_undo(tmp_path: Path) -> None:
     assert not s.undo()
 
 
-def test_the_loaded_designs_own_value_is_no_change(tmp_path: Path) -> None:
-    s = session(tmp_path)
+def test_the_loaded_designs_own_value_is_no_change(s: Session) -> None:
     s.set("thigh_length", 0.3)
     assert s.changed() == {"thigh_length": 0.25}
     s.set("thigh_length", 0.25)
@@ -149,8 +154,7 @@ def test_the_loaded_designs_own_value_is_no_change(tmp_path: Path) -> None:
     assert s.changed() == {}
 
 
-def test_a_refused_design_is_shown_but_not_exported(tmp_path: Path) -> None:
-    s = session(tmp_path)
+def test_a_refused_design_is_shown_but_not_exported(s: Session, tmp_path: Path) -> None:
     s.set("actuators.leg.peak_torque", 290.0)
     assert not s.design.accepted
     assert "refused" in cards.head(s)
@@ -162,20 +166,20 @@ def test_a_refused_design_is_shown_but_not_exported(tmp_path: Path) -> None:
     assert (tmp_path / "calm" / "robot.xml").is_file()
 
 
-def test_an_export_replaces_only_what_the_same_tab_exported(tmp_path: Path) -> None:
-    (tmp_path / "out" / "mine").mkdir(parents=True)
-    (tmp_path / "out" / "mine" / "robot.xml").write_text("of somebody else")
-    s = session(tmp_path / "designs")
-    assert s.export("mine", tmp_path / "out") is None
+def test_an_export_replaces_only_what_the_same_tab_exported(s: Session, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (out / "mine").mkdir(parents=True)
+    (out / "mine" / "robot.xml").write_text("of somebody else")
+    assert s.export("mine", out) is None
     assert "mine' exists already; it is kept" in s.message
-    assert (tmp_path / "out" / "mine" / "robot.xml").read_text() == "of somebody else"
-    assert s.export("other", tmp_path / "out")
+    assert s.export("other", out)
     s.set("thigh_length", 0.3)
-    assert s.export("other", tmp_path / "out") is None
+    assert s.export("other", out) is None
     assert "tick 'Replace'" in s.message
-    assert s.export("other", tmp_path / "out", replace=True) == tmp_path / "out" / "other"
-    assert s.export("mine", tmp_path / "out", replace=True) is None
-    assert session(tmp_path / "designs").export("other", tmp_path / "out") is None
+    assert s.export("other", out, replace=True) == out / "other"
+    assert s.export("mine", out, replace=True) is None
+    assert (out / "mine" / "robot.xml").read_text() == "of somebody else"
+    assert session(tmp_path / "designs").export("other", out) is None
 
 
 @pytest.mark.parametrize("name", ["", "../x", "a/b", "a b", "x" * 65, "/tmp/x", "a\n"])
@@ -187,8 +191,7 @@ def test_only_names_are_names(tmp_path: Path, name: str) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_design_is_not_written_over_unless_that_is_asked_for(tmp_path: Path) -> None:
-    s = session(tmp_path)
+def test_a_design_is_not_written_over_unless_that_is_asked_for(s: Session) -> None:
     assert s.save("mine")
     for loaded in ("", "mine"):
         s.load(loaded)
@@ -230,22 +233,17 @@ def test_replacing_a_design_leaves_other_tabs_and_undo_as_they_were(tmp_path: Pa
     assert other.value("thigh_length") == 0.4
 
 
-@pytest.mark.parametrize("replace", [False, True])
-def test_no_design_is_saved_under_the_name_of_the_values_in_parameters_yaml(
-    tmp_path: Path, replace: bool
+def test_default_is_the_name_of_the_values_in_parameters_yaml_and_of_no_design(
+    s: Session, tmp_path: Path
 ) -> None:
-    s = session(tmp_path)
-    assert s.save("default", replace) is None
-    assert "'default' stands for the values in parameters.yaml" in s.message
-    assert "choose another name" in s.message
+    for replace in (False, True):
+        assert s.save("default", replace) is None
+        assert "'default' stands for the values in parameters.yaml" in s.message
+        assert "choose another name" in s.message
     assert not list(tmp_path.iterdir())
-
-
-def test_a_design_called_default_is_not_listed_beside_the_values_in_parameters_yaml(
-    tmp_path: Path,
-) -> None:
-    (tmp_path / "default.yaml").write_text("doc: Of an older studio.\nvalues: {}\n")
-    (tmp_path / "mine.yaml").write_text("doc: Mine.\nvalues: {}\n")
+    # One of an older studio is not listed.
+    for name in ("default", "mine"):
+        (tmp_path / f"{name}.yaml").write_text("doc: A design.\nvalues: {}\n")
     assert Library(quadruped(), tmp_path).names() == [*quadruped().designs, "mine"]
     own = tmp_path / "quadruped"
     shutil.copytree(ROBOTS / "quadruped", own)
@@ -253,6 +251,9 @@ def test_a_design_called_default_is_not_listed_beside_the_values_in_parameters_y
     spec = draft.load(own)
     assert "default" in spec.designs
     assert "default" not in Library(spec).names()
+    # A robot of one's own keeps its designs.
+    assert Session(Library(spec)).save("mine") == own / "designs" / "mine.yaml"
+    assert "mine" in draft.load(own).designs
 
 
 def test_all_tabs_together_write_no_more_than_the_limit_in_a_minute(tmp_path: Path) -> None:
@@ -271,14 +272,6 @@ def test_all_tabs_together_write_no_more_than_the_limit_in_a_minute(tmp_path: Pa
     assert one.save("d") is None
     now[0] = 60.0
     assert one.save("d")
-
-
-def test_a_robot_of_ones_own_keeps_its_designs(tmp_path: Path) -> None:
-    folder = tmp_path / "quadruped"
-    shutil.copytree(ROBOTS / "quadruped", folder)
-    s = Session(Library(draft.load(folder)))
-    assert s.save("mine") == folder / "designs" / "mine.yaml"
-    assert "mine" in draft.load(folder).designs
 
 
 def test_every_number_is_a_field(tmp_path: Path) -> None:
@@ -320,8 +313,7 @@ def test_all_robots_can_be_drawn_told_and_dropped(tmp_path: Path, robot: str) ->
     assert drop.data.qpos[2] < base + HEIGHT
 
 
-def test_text_cannot_become_markup(tmp_path: Path) -> None:
-    s = session(tmp_path)
+def test_text_cannot_become_markup(s: Session) -> None:
     s.set_text("foot_radius", "<img src=x onerror=alert(1)>")
     assert "<img" not in cards.head(s)
     with pytest.raises(DraftError):
@@ -331,8 +323,7 @@ def test_text_cannot_become_markup(tmp_path: Path) -> None:
 def test_a_session_begins_with_changes_that_can_be_reset(tmp_path: Path) -> None:
     library = Library(quadruped(), tmp_path)
     s = Session(library, Point("cheetah", {"thigh_length": 0.3}))
-    assert s.value("thigh_length") == 0.3
-    assert s.changed() == {"thigh_length": 0.25}
+    assert (s.value("thigh_length"), s.changed()) == (0.3, {"thigh_length": 0.25})
     assert s.reset_all()
     assert s.value("thigh_length") == 0.25
     with pytest.raises(DraftError, match="thigh_length"):

@@ -8,17 +8,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from draft.learn.engine import machine
+from draft.learn.engine.machine import Machine
 from draft.learn.measuring import results
 from draft.learn.measuring.evaluation import prepare
 from draft.learn.measuring.summary import FORMAT
 from draft.learn.training.run import create, is_run, open_run, versions
 from draft.spec.reader import read_text
+from draft.study import capacity, placement
 from draft.study.execution import Execution
 from draft.study.file import Study
 from draft.study.graph import graph
 from draft.study.jobs import Group, Job, Physics, Training
 from draft.study.requests import EvaluateRequest, Request, TrainRequest
-from draft.study.store import Store
+from draft.study.store import DONE, Store
 from tests.learn.small import member
 
 TEXT = """\
@@ -30,6 +35,7 @@ environments: 4
 evaluate: {replicas: 2, levels: 2}
 """
 SMALL = TEXT.replace("seeds: 2", "seeds: 1")
+LARGE = TEXT.replace("environments: 4", "environments: 64")
 
 
 def study(text: str = TEXT, toy: bool = False) -> Study:
@@ -47,6 +53,16 @@ def jobs(text: str = TEXT, *names: str) -> dict[str, Job]:
 def store(folder: Path, text: str = TEXT, *names: str) -> Store:
     chosen = groups(*names)
     return Store(folder, study(text), chosen, graph(study(text), chosen))
+
+
+def machine_of(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let this machine have some cores and no GPU, and native MuJoCo be of use."""
+    for place in (capacity, machine):
+        monkeypatch.setattr(place, "cores", lambda: cores)
+    monkeypatch.setattr(machine, "obstacle", lambda: None)
+    cpu = Machine(["cpu"], machine.choose("auto", ["cpu"]), None, cores)
+    monkeypatch.setattr(placement, "this_machine", lambda: cpu)
+    monkeypatch.setattr(placement, "_devices", lambda word: ["cpu"])
 
 
 class Killed(BaseException):
@@ -141,7 +157,7 @@ class Fake:
         self._code = None
 
 
-def go(folder: Path, worker: Fake, text: str = TEXT, *names: str, **more: Any) -> Execution:
+def go(folder: Path, worker: Fake, text: str = SMALL, *names: str, **more: Any) -> Execution:
     """One call of the study."""
     opened = store(folder, text, *names)
     try:
@@ -159,6 +175,14 @@ def states(folder: Path) -> dict[str, str]:
 
 def told(folder: Path) -> dict:
     return json.loads((folder / "study.json").read_text())
+
+
+def again(folder: Path, text: str = SMALL, *names: str) -> list[str]:
+    """Jobs that one more call does, after which all are done."""
+    worker = Fake()
+    go(folder, worker, text, *names)
+    assert set(states(folder).values()) == {DONE}
+    return worker.began
 
 
 def dying(name: str, how: Callable[[Any], None]) -> Fake:

@@ -71,13 +71,15 @@ def test_each_sensitivity_study_changes_one_choice_of_the_study_of_three() -> No
     assert all(one.designs == of_three.designs for one in (paper, fine, twice))
 
 
-def test_numbers_of_the_tasks_are_set() -> None:
-    changed = study(
-        TEXT + "set: {rewards.height: 0.5, ground.step: [0, 0.1], learning.mirror: true}\n"
-    )
-    assert changed.config.rewards.height == 0.5
-    assert changed.config.ground.step == (0.0, 0.1)
-    assert changed.config.learning.mirror
+def test_numbers_of_the_tasks_and_a_ground_are_those_of_all_stages() -> None:
+    text = TEXT + "ground: flat\n"
+    text += "set: {rewards.height: 0.5, ground.step: [0, 0.1], learning.mirror: true}\n"
+    for job in graph(study(text), groups()).values():
+        if isinstance(job, Training):
+            config = job.plan.config
+            assert (job.plan.ground, job.plan.see_ground) == ("flat", False)
+            assert (config.rewards.height, config.ground.step) == (0.5, (0.0, 0.1))
+            assert config.learning.mirror
 
 
 def test_a_recipe_is_what_the_other_numbers_start_from() -> None:
@@ -96,31 +98,20 @@ def test_a_recipe_is_what_the_other_numbers_start_from() -> None:
     assert study(text + "environments: 32\n").environments == 32
 
 
-def test_a_ground_is_that_of_all_stages() -> None:
-    jobs = graph(study(TEXT + "ground: flat\n"), groups())
-    plans = [job.plan for job in jobs.values() if isinstance(job, Training)]
-    assert {(plan.ground, plan.see_ground) for plan in plans} == {("flat", False)}
-
-
-def test_a_toys_sizes_win_over_the_recipe() -> None:
-    toy = study("designs: [cheetah]\nrecipe: laptop\n", toy=True)
-    assert (toy.environments, toy.iterations("base")) == (8, 2)
-    assert (toy.config.learning.hidden, toy.config.learning.steps) == ((32, 32), 8)
-    assert toy.config.learning.mirror == LAPTOP.config.learning.mirror
-    assert toy.recipe == LAPTOP
-
-
 def test_a_toy_keeps_designs_stages_and_numbers_and_makes_the_rest_small() -> None:
     text = TEXT + "set: {rewards.height: 0.5}\ntoy: {evaluate: {replicas: 3}}\n"
     toy = study(text, toy=True)
-    assert toy.stages == ("base", "push")
-    assert toy.seeds == (0,)
-    assert toy.environments == 8
-    assert toy.iterations("push") == 2
+    assert (toy.stages, toy.seeds) == (("base", "push"), (0,))
+    assert (toy.environments, toy.iterations("push")) == (8, 2)
     assert toy.config.rewards.height == 0.5
     assert toy.config.learning.hidden == (32, 32)
     assert (toy.evaluate.replicas, toy.evaluate.levels, toy.evaluate.perturbed) == (3, 3, True)
     assert study(text).config.learning.hidden == (512, 256, 128)
+    # Its sizes win over the recipe.
+    toy = study("designs: [cheetah]\nrecipe: laptop\n", toy=True)
+    assert (toy.recipe, toy.environments, toy.iterations("base")) == (LAPTOP, 8, 2)
+    assert (toy.config.learning.hidden, toy.config.learning.steps) == ((32, 32), 8)
+    assert toy.config.learning.mirror == LAPTOP.config.learning.mirror
 
 
 @pytest.mark.parametrize("word", inertia.SOURCES)
@@ -171,6 +162,10 @@ def test_a_family_is_read() -> None:
         (TEXT.replace("base: 3", "bse: 3"), "small.yaml:4:14: iterations.bse: unknown value 'bse'"),
         (TEXT.replace("levels: 2", "levels: two"), "evaluate.levels: expected a whole number"),
         (TEXT.replace("levels: 2", "seconds: 0"), "evaluate.seconds: expected a number from 0.5"),
+        (
+            TEXT + "set: {learning.iterations_base: 20000000}\n",
+            r"learning.iterations_base must be from 1 to 10000000, and is 20000000",
+        ),
         (TEXT.replace("levels: 2", "perturbed: 1"), "evaluate.perturbed: expected true or false"),
         (TEXT.replace("levels: 2", "errors: papr"),
          "small.yaml:6:33: evaluate.errors: unknown value 'papr'\n  did you mean 'paper'?"),

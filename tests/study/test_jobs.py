@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -23,12 +25,23 @@ from draft.study import graph as graphs
 from draft.study.capacity import Capacity
 from draft.study.costs import ASSUMED_RATE, Rates, hours
 from draft.study.graph import graph
-from draft.study.jobs import Evaluating, Group, Job, Physics, Training
+from draft.study.jobs import AUTO, Evaluating, Group, Job, Physics, Training
 from draft.study.requests import EvaluateRequest, ReportRequest, TrainRequest
 from tests.learn.small import member
 from tests.study.small import TEXT, groups, jobs, request_of, study, write_output
 
 HEIGHT = "set: {rewards.height: 0.5}\n"
+
+
+def asked(job: Job, folder: Path, how: Physics = AUTO) -> Any:
+    """What a worker is asked to do for a job."""
+    return job.request(folder, "cpu", None, how)
+
+
+def training(made: dict[str, Job], name: str) -> Training:
+    job = made[name]
+    assert isinstance(job, Training)
+    return job
 
 
 def differing(a: dict[str, Job], b: dict[str, Job]) -> set[str]:
@@ -53,8 +66,8 @@ def test_every_job_comes_after_what_it_needs_and_whole_seeds_come_first() -> Non
 def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
     made = jobs(TEXT.replace("levels: 2", "levels: 2, published: true"))
     run = f"{tmp_path}/runs/bear-push-1"
-    asked = made["bear-push-1"].request(tmp_path, "cuda", 1.5)
-    assert asked == TrainRequest(run=run, iterations=2, minutes=1.5, device="cuda")
+    train = made["bear-push-1"].request(tmp_path, "cuda", 1.5)
+    assert train == TrainRequest(run=run, iterations=2, minutes=1.5, device="cuda")
     evaluate = made["bear-push-1-perturbed-published"].request(tmp_path, "cpu", 1.0)
     assert evaluate == EvaluateRequest(
         run=run,
@@ -66,10 +79,9 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
         protocol="published",
         device="cpu",
     )
-    nominal = made["bear-push-1-nominal"].request(tmp_path, "cpu", None)
-    assert isinstance(nominal, EvaluateRequest)
+    nominal = asked(made["bear-push-1-nominal"], tmp_path)
     assert (nominal.errors, nominal.protocol) == (None, "walking")
-    assert made["report"].request(tmp_path, "cpu", None) == ReportRequest(study=str(tmp_path))
+    assert asked(made["report"], tmp_path) == ReportRequest(study=str(tmp_path))
 
 
 def test_a_training_is_prepared_once_and_starts_from_its_base(tmp_path: Path) -> None:
@@ -111,21 +123,16 @@ def test_the_key_of_an_evaluation_keeps_its_words(monkeypatch: pytest.MonkeyPatc
 def test_how_jobs_are_done_goes_to_the_requests_and_not_into_keys(tmp_path: Path) -> None:
     made, how = jobs(), Physics("native", 2)
     job = made["bear-base-0"]
-    train = job.request(tmp_path, "cpu", None, how)
-    assert isinstance(train, TrainRequest)
-    assert (train.engine, train.replicas) == ("native", 2)
-    evaluate = made["bear-base-0-nominal"].request(tmp_path, "cpu", None, how)
-    assert isinstance(evaluate, EvaluateRequest)
-    # Its replicas are roll-outs.
-    assert (evaluate.engine, evaluate.replicas) == ("native", 2)
-    assert made["report"].request(tmp_path, "cpu", None, how) == ReportRequest(study=str(tmp_path))
+    for name in ("bear-base-0", "bear-base-0-nominal"):  # Replicas of the latter are roll-outs.
+        request = asked(made[name], tmp_path, how)
+        assert (request.engine, request.replicas) == ("native", 2)
+    assert asked(made["report"], tmp_path, how) == ReportRequest(study=str(tmp_path))
     # A run that was begun goes on with as many processes as its state is of.
     write_output(request_of(job, tmp_path), done=1)
     state = tmp_path / "runs/bear-base-0/state.json"
     state.write_text(json.dumps({"iteration": 1, "processes": 1, "engine": "warp"}))
-    train = job.request(tmp_path, "cpu", None, how)
-    assert isinstance(train, TrainRequest)
-    assert (train.engine, train.replicas) == ("native", None)
+    request = asked(job, tmp_path, how)
+    assert (request.engine, request.replicas) == ("native", None)
 
 
 def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
@@ -133,8 +140,7 @@ def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
     text = TEXT.replace("[base, push]", "[base, velocity, terrain, push]") + "recipe: laptop\n"
     made = jobs(text)
     for stage in STAGES:
-        job = made[f"bear-{stage}-0"]
-        assert isinstance(job, Training)
+        job = training(made, f"bear-{stage}-0")
         assert (job.plan.ground, job.plan.config) == (LAPTOP.ground(stage), LAPTOP.config)
         # Only terrain makes the base policy, which is of a plane, see the ground.
         assert job.plan.see_ground == (stage == "terrain")
@@ -142,31 +148,18 @@ def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
         assert job.holds(tmp_path, job.output(tmp_path))
 
 
-def test_a_policy_that_saw_the_ground_keeps_seeing_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_policy_that_saw_the_ground_keeps_seeing_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(STAGES._items, "base", replace(STAGES["base"], uneven=True))
     made = jobs(TEXT + "recipe: laptop\n")
     for stage in ("base", "push"):
-        job = made[f"bear-{stage}-0"]
-        assert isinstance(job, Training)
+        job = training(made, f"bear-{stage}-0")
         assert (job.plan.ground, job.plan.see_ground) == (LAPTOP.ground(stage), True)
-        write_output(request_of(job, tmp_path))
-        assert job.holds(tmp_path, job.output(tmp_path))
 
 
-def test_another_recipe_makes_all_new_and_none_is_the_published_one() -> None:
-    assert differing(jobs(), jobs(TEXT + "recipe: paper\n")) == set()
-    assert differing(jobs(), jobs(TEXT + "recipe: laptop\n")) == jobs().keys() - {"report"}
-
-
-def test_other_inertia_errors_make_perturbed_jobs_new_and_no_others(tmp_path: Path) -> None:
-    other = jobs(TEXT.replace("levels: 2", "levels: 2, errors: paper"))
-    assert differing(jobs(), other) == {name for name in jobs() if name.endswith("-perturbed")}
+def test_inertia_errors_are_those_of_the_perturbed_arm(tmp_path: Path) -> None:
+    made = jobs(TEXT.replace("levels: 2", "levels: 2, errors: paper"))
     for arm, errors in (("perturbed", "paper"), ("nominal", None)):
-        asked = other[f"bear-push-1-{arm}"].request(tmp_path, "cpu", None)
-        assert isinstance(asked, EvaluateRequest)
-        assert asked.errors == errors
+        assert asked(made[f"bear-push-1-{arm}"], tmp_path).errors == errors
 
 
 def test_numbers_of_the_file_are_those_of_its_runs(tmp_path: Path) -> None:
@@ -209,30 +202,26 @@ def test_a_design_that_changes_makes_only_its_own_jobs_new() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "part"),
+    ("old", "new", "reached"),
     [
         ("push: 2", "push: 3", "push"),
         ("base: 3", "base: 4", ""),
         ("environments: 4", "environments: 5", ""),
-        ("replicas: 2", "replicas: 3", "al"),
-        ("levels: 2", "levels: 3", "al"),
+        ("replicas: 2", "replicas: 3", "al$|ed$"),
+        ("levels: 2", "levels: 3", "al$|ed$"),
+        ("levels: 2", "levels: 2, errors: paper", "-perturbed"),
+        ("seeds: 2", "seeds: 3", "none"),
+        ("seeds: 2", "seeds: 2\nrecipe: paper", "none"),
+        ("seeds: 2", "seeds: 2\nrecipe: laptop", ""),
     ],
 )
 def test_a_change_reaches_what_depends_on_it_and_nothing_else(
-    old: str, new: str, part: str
+    old: str, new: str, reached: str
 ) -> None:
-    found = differing(jobs(), jobs(TEXT.replace(old, new)))
-    if part == "al":
-        assert found == {n for n, job in jobs().items() if job.kind == "evaluate"}
-    else:
-        assert found == {name for name in jobs() if part in name} - {"report"}
-
-
-def test_more_seeds_leave_the_others_as_they_are() -> None:
-    more = jobs(TEXT.replace("seeds: 2", "seeds: 3"))
-    assert differing(jobs(), more) == set()
-    assert len(more) > len(jobs())
-    assert more["report"].key != jobs()["report"].key
+    before, after = jobs(), jobs(TEXT.replace(old, new))
+    assert differing(before, after) == {n for n in before if re.search(reached, n)} - {"report"}
+    same = "recipe: paper" in new
+    assert (before["report"].key == after["report"].key) == same
 
 
 def test_a_version_of_draft_makes_all_new_a_format_evaluations_and_a_library_nothing(
@@ -248,28 +237,31 @@ def test_a_version_of_draft_makes_all_new_a_format_evaluations_and_a_library_not
     assert differing(before, jobs()) == before.keys() - {"report"}
 
 
-def write(tmp_path: Path, name: str) -> Job:
+def write(tmp_path: Path, name: str, done: int | None = None) -> Job:
     """Do a job."""
     job = jobs()[name]
-    write_output(request_of(job, tmp_path))
+    write_output(request_of(job, tmp_path), done)
     return job
 
 
-def test_only_what_answers_an_evaluation_completes_it(tmp_path: Path) -> None:
+def test_only_what_answers_an_evaluation_completes_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     write(tmp_path, "bear-push-0")
     job = write(tmp_path, "bear-push-0-nominal")
     assert isinstance(job, Evaluating)
     assert job.complete(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(results, "read", lambda folder: pytest.fail("it is read again"))
+        assert job.complete(tmp_path)
     for change in ({"replicas": 3}, {"levels": 3}, {"levels": None}, {"seed": 1}, {"seconds": 3.0}):
         other = job.options.model_copy(update=change)
         assert not replace(job, _known={}, options=other).complete(tmp_path)
     summary = job.output(tmp_path) / "summary.json"
     told = json.loads(summary.read_text())
-    for other in ({"asked": None}, {"format": 0}):
-        files.write(summary, json.dumps(told | other))
-        assert not job.complete(tmp_path)
-    files.write(summary, json.dumps(told))
-    assert job.complete(tmp_path)
+    for changed, complete in (({"asked": None}, False), ({"format": 0}, False), ({}, True)):
+        files.write(summary, json.dumps(told | changed))
+        assert job.complete(tmp_path) == complete
     files.write(tmp_path / "runs/bear-push-0/model_2.pt", "trained anew")
     assert not job.complete(tmp_path)
     write(tmp_path, "bear-push-0-nominal")
@@ -278,33 +270,20 @@ def test_only_what_answers_an_evaluation_completes_it(tmp_path: Path) -> None:
     assert not job.complete(tmp_path)
 
 
-def test_a_result_is_read_once_as_long_as_it_stays(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    write(tmp_path, "bear-push-0")
-    job = write(tmp_path, "bear-push-0-nominal")
-    assert job.complete(tmp_path)
-    monkeypatch.setattr(results, "read", lambda folder: pytest.fail("it is read again"))
-    assert job.complete(tmp_path)
-
-
 def test_a_run_that_was_trained_further_is_done_and_evaluated_where_it_was_asked_for(
     tmp_path: Path,
 ) -> None:
-    job = write(tmp_path, "bear-base-0")
-    write_output(request_of(job, tmp_path), done=9)
+    job = write(tmp_path, "bear-base-0", done=3)
+    write(tmp_path, "bear-base-0", done=9)
     assert job.complete(tmp_path)
-    asked = jobs()["bear-base-0-nominal"].request(tmp_path, "cpu", None)
-    assert isinstance(asked, EvaluateRequest)
-    assert asked.checkpoint == 3
+    assert asked(jobs()["bear-base-0-nominal"], tmp_path).checkpoint == 3
     (tmp_path / "runs/bear-base-0/model_3.pt").unlink()
     assert not job.complete(tmp_path)
 
 
 def test_a_run_of_something_else_is_not_complete(tmp_path: Path) -> None:
     write_output(request_of(jobs(TEXT + HEIGHT)["bear-base-0"], tmp_path))
-    job = jobs()["bear-base-0"]
-    assert isinstance(job, Training)
+    job = training(jobs(), "bear-base-0")
     assert not job.complete(tmp_path)
     assert job.differing(job.output(tmp_path)) == ["rewards.height"]
     (job.output(tmp_path) / "run.json").write_text("[")
@@ -331,8 +310,7 @@ def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:
     text = "iteration,steps_per_s\n1,3\n2,500\n3,700\n4,6e2\n5,"
     (tmp_path / "runs/bear-base-0/progress.csv").write_text(text)
     rates = Rates(tmp_path, made)
-    assert rates.of("base") == 600.0
-    assert rates.of("push") == 600.0
+    assert (rates.of("base"), rates.of("push")) == (600.0, 600.0)
     assert "measured in this study: base 600" in rates.words()
     # One iteration of three is left.
     assert hours(made["bear-base-0"], tmp_path, rates) == pytest.approx(4 * 24 / 600 / 3600)

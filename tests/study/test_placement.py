@@ -8,27 +8,18 @@ from typing import Any
 import pytest
 
 from draft.errors import DraftError
-from draft.learn.engine import machine
 from draft.learn.engine.machine import Machine
-from draft.study import capacity
 from draft.study import placement as module
 from draft.study.jobs import Physics
-from draft.study.placement import Placement, expected_capacity, make_workers
+from draft.study.options import Placement
+from draft.study.placement import expected_capacity, make_workers
 from draft.study.workers import LocalWorker, RayWorker
-from tests.study.small import TEXT, study
-
-LARGE = TEXT.replace("environments: 4", "environments: 64")
+from tests.study.small import LARGE, machine_of, study
 
 
 @pytest.fixture(autouse=True)
 def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine of two cores without a GPU, where native MuJoCo can be used."""
-    for place in (capacity, machine):
-        monkeypatch.setattr(place, "cores", lambda: 2)
-    monkeypatch.setattr(machine, "obstacle", lambda: None)
-    cpu = Machine(["cpu"], machine.choose("auto", ["cpu"]), None, 2)
-    monkeypatch.setattr(module, "this_machine", lambda: cpu)
-    monkeypatch.setattr(module, "_devices", lambda word: ["cpu"])
+    machine_of(2, monkeypatch)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +27,6 @@ def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         (Placement(), False, [Physics("auto", 2)]),
         (Placement(engine="warp"), False, [Physics("warp", 1)] * 2),
-        (Placement(replicas=1), False, [Physics("auto", 1)] * 2),
         (Placement(workers=2, engine="native"), False, [Physics("native", 1)] * 2),
         (Placement(), True, [Physics("auto", 1)] * 2),
     ],
@@ -59,27 +49,20 @@ def test_each_gpu_has_a_worker_unless_more_are_asked_for(monkeypatch: pytest.Mon
         found = make_workers(study(), Placement(workers=workers))
         assert [worker.physics for worker in found] == [Physics()] * count
         assert {worker.device for worker in found} == {"cuda"}
-    with pytest.raises(DraftError, match="`replicas` 2 is for a CPU"):
+    with pytest.raises(DraftError, match="`replicas`"):
         make_workers(study(), Placement(replicas=2))
-
-
-def test_workers_take_the_gpus_that_this_process_sees(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Those that this process sees.
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,GPU-5")
-    monkeypatch.setattr(module, "_devices", lambda word: ["cuda:0", "cuda:1"])
     workers = make_workers(study(), Placement(workers=3))
     names = [worker._gpu for worker in workers if isinstance(worker, LocalWorker)]
     assert names == ["4", "GPU-5", "4"]
 
 
-def test_a_gpu_that_is_not_here_can_be_estimated_for() -> None:
-    assumed = expected_capacity(study(), Placement("cuda:7"))
+def test_a_machine_that_is_not_here_can_be_estimated_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    assumed = expected_capacity(study(), Placement(device="cuda:7"))
     assert assumed is not None
     assert (assumed.engine.name, assumed.on_cpu, assumed.at_once) == ("warp", False, None)
-
-
-def test_where_nothing_can_be_learnt_no_capacity_is_expected(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    # Where nothing can be learnt, no capacity is expected.
     monkeypatch.setattr(module, "this_machine", lambda: Machine(["cpu"], None, "torch", 2))
     assert expected_capacity(study(), Placement()) is None
 
@@ -102,25 +85,24 @@ class _Ray(types.ModuleType):
 
 
 @pytest.mark.parametrize(
-    ("resources", "given", "count", "device"),
+    ("resources", "given", "devices"),
     [
-        ({"CPU": 5.0, "GPU": 3.0}, Placement(ray=True), 3, "cuda"),
-        ({"CPU": 5.0, "GPU": 3.0}, Placement(ray=True, workers=2), 2, "cuda"),
-        ({"CPU": 5.0}, Placement("cpu", ray=True), 5, "cpu"),
-        ({"CPU": 5.0}, Placement("cpu", ray=True, replicas=2), 2, "cpu"),
+        ({"CPU": 5.0, "GPU": 3.0}, Placement(ray=True), ["cuda"] * 3),
+        ({"CPU": 5.0, "GPU": 3.0}, Placement(ray=True, workers=2), ["cuda"] * 2),
+        ({"CPU": 5.0}, Placement(device="cpu", ray=True), ["cpu"] * 5),
+        ({"CPU": 5.0}, Placement(device="cpu", ray=True, replicas=2), ["cpu"] * 2),
     ],
 )
 def test_a_cluster_has_a_worker_per_gpu_or_per_group_of_cores(
     resources: dict[str, float],
     given: Placement,
-    count: int,
-    device: str,
+    devices: list[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "need", lambda name, extra: _Ray(**resources))
     workers = make_workers(study(), given)
     assert all(isinstance(worker, RayWorker) for worker in workers)
-    assert [worker.device for worker in workers] == [device] * count
+    assert [worker.device for worker in workers] == devices
 
 
 def test_a_cluster_without_a_gpu_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,10 +111,17 @@ def test_a_cluster_without_a_gpu_is_reported(monkeypatch: pytest.MonkeyPatch) ->
         make_workers(study(), Placement(ray=True))
 
 
-def test_options_out_of_range_are_refused() -> None:
-    for workers in (0, 1025):
-        with pytest.raises(DraftError, match=f"`workers` {workers} is not from 1 to 1024"):
-            Placement(workers=workers).check()
-    with pytest.raises(DraftError, match=r"`address` is for a Ray cluster\n.*`ray`"):
-        Placement(address="here:1").check()
-    Placement(workers=2, ray=True, address="here:1").check()
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        *(
+            ({"workers": n}, f"`workers` {n} is not a whole number from 1 to 1024")
+            for n in (0, 1025)
+        ),
+        ({"address": "here:1"}, r"`address` is for a Ray cluster\n.*`ray`"),
+    ],
+)
+def test_options_out_of_range_are_refused(given: dict[str, Any], words: str) -> None:
+    Placement.of({"workers": 2, "ray": True, "address": "here:1"})
+    with pytest.raises(DraftError, match=words):
+        Placement.of(given)

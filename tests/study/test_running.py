@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,7 +12,7 @@ from draft.study import read_study, run_study
 from draft.study import running as module
 from draft.study.execution import Watch
 from draft.study.jobs import Job
-from draft.study.placement import Placement
+from draft.study.options import RunOptions
 from draft.study.store import Store
 from tests.study.small import SMALL, Fake, jobs
 
@@ -47,26 +48,22 @@ class Log(Watch):
 
 
 def test_a_study_runs_prints_nothing_and_says_what_was_done(
-    worker: Fake, capsys: pytest.CaptureFixture[str]
+    worker: Fake, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    outcome = run_study("mine.yaml")
-    assert worker.began == ORDER
+    watch = Log()
+    outcome = run_study("mine.yaml", watch=watch)
+    assert worker.began == watch.jobs == ORDER
+    assert watch.states == [(name, state) for name in ORDER for state in ("running", "done")]
+    assert watch.ticks >= len(ORDER)
     assert outcome.folder == Path("studies/mine").absolute()
     assert outcome.done
     assert outcome.jobs == dict.fromkeys(ORDER, "done")
     assert (outcome.failures, outcome.minutes_needed) == ({}, None)
     assert outcome.report == outcome.folder / "report/index.html"
     assert capsys.readouterr() == ("", "")
-
-
-def test_a_finished_study_needs_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
-    run_study("mine.yaml", "here")
-
-    def fails(*_: object) -> None:
-        raise AssertionError
-
-    monkeypatch.setattr(module, "make_workers", fails)
-    assert run_study(Path("mine.yaml"), Path("here")).done
+    # A finished study needs no worker.
+    monkeypatch.setattr(module, "make_workers", lambda *_: pytest.fail("a worker is made"))
+    assert run_study(Path("mine.yaml"), Path("studies/mine")).done
 
 
 def test_a_study_that_was_read_runs_as_its_file_does(worker: Fake) -> None:
@@ -85,33 +82,23 @@ def test_a_failure_is_returned_and_the_next_call_resumes(
     failing = Fake(lambda name, _: 2 if name == "cheetah-push-0" else None)
     monkeypatch.setattr(module, "make_workers", lambda *_: [failing])
     outcome = run_study("mine.yaml")
-    assert not outcome.done
-    assert list(outcome.failures) == ["cheetah-push-0"]
+    assert (outcome.done, list(outcome.failures)) == (False, ["cheetah-push-0"])
     assert outcome.jobs["cheetah-push-0-nominal"] == "skipped"
     monkeypatch.setattr(module, "make_workers", lambda *_: [worker])
     assert run_study("mine.yaml").done
     assert worker.began[0] == "cheetah-push-0"
 
 
-def test_the_progress_can_be_watched() -> None:
-    watch = Log()
-    run_study("mine.yaml", watch=watch)
-    assert watch.jobs == ORDER
-    pairs = [(name, state) for name in ORDER for state in ("running", "done")]
-    assert watch.states == pairs
-    assert watch.ticks >= len(ORDER)
-
-
 def test_the_options_reach_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    found: list[Placement] = []
+    found: list[RunOptions] = []
 
-    def make(study: object, placement: Placement) -> list[Fake]:
+    def make(study: object, placement: RunOptions) -> list[Fake]:
         found.append(placement)
         return [Fake()]
 
     monkeypatch.setattr(module, "make_workers", make)
     run_study("mine.yaml", device="cpu", workers=2, engine="native", replicas=3)
-    assert found == [Placement("cpu", 2, "native", 3)]
+    assert found == [RunOptions(device="cpu", workers=2, engine="native", replicas=3)]
 
 
 def test_too_short_a_time_limit_does_nothing_and_says_what_is_needed(worker: Fake) -> None:
@@ -120,12 +107,17 @@ def test_too_short_a_time_limit_does_nothing_and_says_what_is_needed(worker: Fak
     assert (outcome.done, outcome.minutes_needed, outcome.report) == (False, 1, None)
 
 
-def test_bad_options_are_refused_before_anything_is_written() -> None:
-    for minutes in (0.0, -1.0, float("nan"), 1e7):
-        with pytest.raises(DraftError, match=r"`minutes` .* is not above 0"):
-            run_study("mine.yaml", minutes=minutes)
-    with pytest.raises(DraftError, match="`workers` 0 is not from 1"):
-        run_study("mine.yaml", workers=0)
-    with pytest.raises(DraftError, match=r"none\.yaml: file not found"):
-        run_study("none.yaml")
+@pytest.mark.parametrize(
+    ("file", "options"),
+    [
+        *(("mine.yaml", {"minutes": minutes}) for minutes in (0.0, -1.0, float("nan"), 1e7)),
+        ("mine.yaml", {"workers": 0}),
+        ("none.yaml", {}),
+    ],
+)
+def test_bad_options_are_refused_before_anything_is_written(
+    file: str, options: dict[str, Any]
+) -> None:
+    with pytest.raises(DraftError, match=next(iter(options), file)):
+        run_study(file, **options)
     assert [path.name for path in Path().iterdir()] == ["mine.yaml"]

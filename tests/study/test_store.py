@@ -12,43 +12,36 @@ import pytest
 
 from draft.errors import DraftError
 from draft.study import execution as module
-from draft.study.store import DONE
 from tests.study.small import (
     SMALL,
     Fake,
     Killed,
+    again,
     dying,
     go,
     jobs,
     request_of,
-    states,
     store,
     write_output,
 )
 
+CHANGED = SMALL + "set: {rewards.height: 0.5}\n"
+
 
 def test_a_number_that_changes_puts_outputs_aside_and_brings_them_back(tmp_path: Path) -> None:
-    go(tmp_path, Fake(), SMALL)
-    changed, back = Fake(), Fake()
-    go(tmp_path, changed, SMALL + "set: {rewards.height: 0.5}\n")
-    assert changed.began == list(jobs(SMALL))
+    again(tmp_path)
+    assert again(tmp_path, CHANGED) == list(jobs(SMALL))
     # Runs and evaluations lie side by side, so that each comes back by itself.
     assert len(list((tmp_path / "aside").iterdir())) == 4 + 8
-    go(tmp_path, back, SMALL)
-    assert back.began == ["report"]
-    go(tmp_path, back, SMALL + "set: {rewards.height: 0.5}\n")
-    assert back.began == ["report", "report"]
+    assert again(tmp_path) == ["report"]
+    assert again(tmp_path, CHANGED) == ["report"]
 
 
 def test_evaluations_that_change_leave_their_runs_and_come_back(tmp_path: Path) -> None:
-    go(tmp_path, Fake(), SMALL)
+    again(tmp_path)
     text = SMALL.replace("replicas: 2", "replicas: 3")
-    changed, back = Fake(), Fake()
-    go(tmp_path, changed, text)
-    expected = [n for n, job in jobs(SMALL).items() if job.kind != "train"]
-    assert changed.began == expected
-    go(tmp_path, back, SMALL)
-    assert back.began == ["report"]
+    assert again(tmp_path, text) == [n for n, job in jobs(SMALL).items() if job.kind != "train"]
+    assert again(tmp_path) == ["report"]
 
 
 def replicas(folder: Path) -> set[int]:
@@ -61,25 +54,21 @@ def test_evaluations_of_several_files_do_not_get_mixed_up(tmp_path: Path) -> Non
     a, b = SMALL, SMALL.replace("replicas: 2", "replicas: 7")
     c = b + "set: {rewards.height: 0.4}\n"
     for text, count in ((a, 2), (b, 7), (c, 7), (a, 2), (c, 7), (b, 7), (a, 2)):
-        worker = Fake()
-        go(tmp_path, worker, text)
+        began = again(tmp_path, text)
         assert replicas(tmp_path) == {count}
-        assert set(states(tmp_path).values()) == {DONE}
-    assert worker.began == ["report"]
+    assert began == ["report"]
     assert not list(tmp_path.glob("aside/*unknown*"))
 
 
 def test_an_evaluation_in_the_way_of_one_that_comes_back_makes_room(tmp_path: Path) -> None:
     b = SMALL.replace("replicas: 2", "replicas: 7")
-    go(tmp_path, Fake(), SMALL)
-    go(tmp_path, Fake(), b)
+    again(tmp_path)
+    again(tmp_path, b)
     # As if a call had been killed between its moves and its note of them.
     record = (tmp_path / "study.json").read_text()
-    go(tmp_path, Fake(), SMALL)
+    again(tmp_path)
     (tmp_path / "study.json").write_text(record)
-    back = Fake()
-    go(tmp_path, back, b)
-    assert back.began == []
+    assert again(tmp_path, b) == []
     assert replicas(tmp_path) == {7}
     assert len(list(tmp_path.glob("aside/*-unknown"))) == 8
 
@@ -92,7 +81,7 @@ def test_a_kill_among_the_moves_mixes_nothing_up(
     a = SMALL.replace("replicas: 2, levels: 2", "levels: 2, replicas: 2")
     b = a.replace("replicas: 2", change)
     for text in (a, b):
-        go(tmp_path, Fake(), text)
+        again(tmp_path, text)
     real, count = os.rename, iter(range(1, 100))
 
     def rename(source: Path, target: Path) -> None:
@@ -102,11 +91,10 @@ def test_a_kill_among_the_moves_mixes_nothing_up(
 
     monkeypatch.setattr(os, "rename", rename)
     with contextlib.suppress(Killed):
-        go(tmp_path, Fake(), a)
+        again(tmp_path, a)
     monkeypatch.undo()
     for text in (a, b):
-        go(tmp_path, Fake(), text)
-        assert set(states(tmp_path).values()) == {DONE}
+        again(tmp_path, text)
         opened = store(tmp_path, text)
         assert all(job.complete(tmp_path) for job in opened.jobs.values())
 
@@ -116,49 +104,64 @@ def test_the_run_of_fewer_iterations_is_not_gone_on_with_where_the_longer_is_kep
 ) -> None:
     longer = SMALL.replace("push: 2", "push: 5")
     for text in (longer, SMALL, longer):
-        worker = Fake()
-        go(tmp_path, worker, text)
-    assert worker.began == ["report"]
-    go(tmp_path, worker, SMALL)
-    assert worker.began == ["report", "report"]
+        began = again(tmp_path, text)
+    assert began == ["report"]
+    assert again(tmp_path) == ["report"]
 
 
 def test_more_iterations_continue_a_run_and_fewer_start_another(tmp_path: Path) -> None:
-    go(tmp_path, Fake(), SMALL)
-    more, fewer = Fake(), Fake()
-    go(tmp_path, more, SMALL.replace("push: 2", "push: 5"))
-    assert more.began == [name for name in jobs(SMALL) if "push" in name or name == "report"]
-    assert (tmp_path / "runs/bear-push-0/model_2.pt").exists()
-    go(tmp_path, fewer, SMALL.replace("push: 2", "push: 1"))
-    assert fewer.began == more.began
-    assert not (tmp_path / "runs/bear-push-0/model_2.pt").exists()
+    again(tmp_path)
+    later = [name for name in jobs(SMALL) if "push" in name or name == "report"]
+    for count, kept in ((5, True), (1, False)):
+        assert again(tmp_path, SMALL.replace("push: 2", f"push: {count}")) == later
+        assert (tmp_path / "runs/bear-push-0/model_2.pt").exists() == kept
 
 
 def test_designs_that_leave_the_study_are_put_aside_and_others_stay(tmp_path: Path) -> None:
-    go(tmp_path, Fake(), SMALL)
-    alone = Fake()
-    go(tmp_path, alone, SMALL.replace("[cheetah, bear]", "[bear]"), "bear")
-    assert alone.began == ["report"]
+    again(tmp_path)
+    assert again(tmp_path, SMALL.replace("[cheetah, bear]", "[bear]"), "bear") == ["report"]
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {"bear-base-0", "bear-push-0"}
 
 
 def test_an_evaluation_that_is_not_the_studys_is_put_aside(tmp_path: Path) -> None:
     with pytest.raises(Killed):
-        go(tmp_path, dying("cheetah-base-0-nominal", lambda _: None), SMALL)
+        go(tmp_path, dying("cheetah-base-0-nominal", lambda _: None))
     # As 'draft evaluate' by hand leaves it, with whatever options.
     asked = request_of(jobs(SMALL)["cheetah-base-0-perturbed"], tmp_path)
     write_output(asked.model_copy(update={"levels": None, "replicas": 256}))
-    later = Fake()
-    go(tmp_path, later, SMALL)
-    assert later.began == list(jobs(SMALL))[1:]
+    assert again(tmp_path) == list(jobs(SMALL))[1:]
     assert (tmp_path / "aside/cheetah-base-0-perturbed-unknown/summary.json").exists()
 
 
-def test_a_folder_with_something_else_is_kept(tmp_path: Path) -> None:
-    (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(DraftError, match=r"holds no study, but mine.txt"):
+RECORD = '{"format": %d, "name": "%s", "toy": %s, "jobs": %s}'
+BROKEN = ("[]", '{"a": 1}')
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "words"),
+    [
+        ("mine.txt", "mine", r"holds no study, but mine.txt"),
+        *(
+            ("study.json", text, "cannot be read as a study")
+            for text in ("{", "[]", "{}", *(RECORD % (1, "a", "false", x) for x in BROKEN))
+        ),
+        ("study.json", RECORD % (9, "small", "false", "{}"), "another version of Draft"),
+        (
+            "study.json",
+            RECORD % (1, "small", "true", "{}"),
+            "is of the toy of study 'small'",
+        ),
+        ("study.json", RECORD % (1, "other", "false", "{}"), "is of study 'other'; it is kept"),
+    ],
+)
+def test_a_folder_that_is_not_the_studys_is_kept(
+    tmp_path: Path, file: str, text: str, words: str
+) -> None:
+    (tmp_path / file).write_text(text)
+    with pytest.raises(DraftError, match=words):
         store(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+    assert [path.name for path in tmp_path.iterdir()] == [file]
+    assert (tmp_path / file).read_text() == text
 
 
 def test_a_file_where_the_folder_should_be_is_reported(tmp_path: Path) -> None:
@@ -169,39 +172,10 @@ def test_a_file_where_the_folder_should_be_is_reported(tmp_path: Path) -> None:
         store(tmp_path / "file/study").open()
 
 
-BROKEN = '{"format": 1, "name": "a", "toy": false, "jobs": %s}'
-
-
-@pytest.mark.parametrize("text", ["{", "[]", "{}", BROKEN % "[]", BROKEN % '{"a": 1}'])
-def test_a_broken_study_is_reported(tmp_path: Path, text: str) -> None:
-    (tmp_path / "study.json").write_text(text)
-    with pytest.raises(DraftError, match="cannot be read as a study"):
-        store(tmp_path)
-
-
-def test_a_study_of_another_format_is_reported(tmp_path: Path) -> None:
-    (tmp_path / "study.json").write_text('{"format": 9, "name": "small", "toy": false, "jobs": {}}')
-    with pytest.raises(DraftError, match=r"another version of Draft"):
-        store(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("name", "toy", "words"),
-    [("small", True, "the toy of study 'small'"), ("other", False, "study 'other'")],
-)
-def test_a_folder_of_another_study_or_of_its_toy_is_kept(
-    tmp_path: Path, name: str, toy: bool, words: str
-) -> None:
-    record = {"format": 1, "name": name, "toy": toy, "jobs": {}}
-    (tmp_path / "study.json").write_text(json.dumps(record))
-    with pytest.raises(DraftError, match=f"is of {words}; it is kept"):
-        store(tmp_path)
-
-
 def test_two_at_once_do_not_work_on_one_folder(tmp_path: Path) -> None:
     one = store(tmp_path)
     one.open()
-    with pytest.raises(DraftError, match=r"another 'draft study' is running .* \(process \d+\)"):
+    with pytest.raises(DraftError, match=r"another run of the study is running .* \(process \d+\)"):
         store(tmp_path).open()
     one.close()
     other = store(tmp_path)
@@ -220,11 +194,10 @@ def test_a_disk_that_is_full_ends_the_study_and_it_resumes(
         return real(self, data)
 
     monkeypatch.setattr(Path, "write_bytes", full)
-    first, second = Fake(), Fake()
+    first = Fake()
     with pytest.raises(DraftError, match="no space left on device"):
-        go(tmp_path, first, SMALL)
+        go(tmp_path, first)
     monkeypatch.undo()
     monkeypatch.setattr(module, "_POLL", 0.0)
-    go(tmp_path, second, SMALL)
-    assert set(states(tmp_path).values()) == {DONE}
-    assert math.isclose(len(first.began) + len(second.began), len(jobs(SMALL)), abs_tol=1)
+    began = first.began + again(tmp_path)
+    assert math.isclose(len(began), len(jobs(SMALL)), abs_tol=1)

@@ -13,7 +13,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from draft.cli import main
 from draft.description.read import describe
 from draft.errors import DraftError
 from draft.imports.importer import import_robot
@@ -22,8 +21,10 @@ from draft.twins.dynamics import Errors, Machine
 from draft.twins.every import Row, score, table_csv
 from draft.twins.record import record
 from draft.twins.vendor import vendor_model
-from tests.imports.written import joint, link, quadruped
+from tests.commands import printed, refusal
+from tests.imports.written import LEGS, joint, link, notes, quadruped, written
 from tests.twins.test_vendors import ROBOTS
+from tests.written import edit
 
 pinocchio = pytest.importorskip("pinocchio")
 SHARED = pytest.mark.skipif(not ROBOTS.is_dir(), reason="the robots are not beside this folder")
@@ -44,12 +45,9 @@ PUBLISHED = {
 
 
 @pytest.fixture
-def vendor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def vendor() -> Path:
     """A sound quadruped in the working directory."""
-    monkeypatch.chdir(tmp_path)
-    path = Path("beast.urdf")
-    path.write_text(quadruped(), encoding="utf-8")
-    return path
+    return written(quadruped())
 
 
 def by_pinocchio(path: Path, joints: list[str], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -94,7 +92,7 @@ def test_pinocchio_finds_the_same_dynamics_of_real_robots(name: str) -> None:
 
 @SHARED
 @pytest.mark.parametrize("name", ["go2", "g1"])
-def test_pinocchio_finds_the_same_dynamics_of_the_twin(name: str, tmp_path: Path) -> None:
+def test_pinocchio_finds_the_same_dynamics_of_the_twin(name: str) -> None:
     """Draft's own model with a body other than its trunk held still."""
     found = compare_twin(ROBOTS / "twins" / TWINS[name][0], poses=2)
     model = found.model.mujoco
@@ -102,7 +100,7 @@ def test_pinocchio_finds_the_same_dynamics_of_the_twin(name: str, tmp_path: Path
     base = found.files.reduced.description.root
     body = next((b for b in range(model.nbody) if model.body(b).name == base), 1)
     machine = Machine(model, own, body, np.eye(3))
-    free = pinocchio.buildModelFromMJCF(str(_saved(found.model.xml, tmp_path)))
+    free = pinocchio.buildModelFromMJCF(str(written(found.model.xml, "twin.xml")))
     free.inertias[1] = trunk_inertia(model)
     data = free.createData()
     free.armature[:] = 0.0
@@ -139,21 +137,13 @@ def trunk_inertia(model: mujoco.MjModel):
     return total
 
 
-def _saved(xml: str, folder: Path) -> Path:
-    path = folder / "twin.xml"
-    path.write_text(xml, encoding="utf-8")
-    return path
-
-
 @SHARED
 @pytest.mark.parametrize("name", TWINS)
-def test_the_calibrated_trunk_is_no_worse_for_the_inertia_of_the_four_twins(
-    name: str, tmp_path: Path
-) -> None:
+def test_the_calibrated_trunk_is_no_worse_for_the_inertia_of_the_four_twins(name: str) -> None:
     file, ours, of_ours, _ = TWINS[name]
     ratio, inertia, gravity = PUBLISHED[name]
     path = ROBOTS / "twins" / file
-    spec = import_robot(path, tmp_path / "twin").spec
+    spec = import_robot(path, "twin").spec
     assert spec.structure == "calibrated"
     found = compare_twin(path, replace(spec, structure="paper"))
     assert found.mass_ratio == pytest.approx(ratio, abs=0.006)
@@ -221,15 +211,20 @@ def test_gravity_is_the_slope_of_the_potential(vendor: Path) -> None:
 
 def test_an_edited_twin_is_compared_by_its_joints(vendor: Path) -> None:
     import_robot(vendor, Path("mine"))
-    text = Path("mine/parameters.yaml").read_text(encoding="utf-8")
-    longer = text.replace("thigh_length: {value: 0.22", "thigh_length: {value: 0.33")
-    assert longer != text
-    Path("mine/parameters.yaml").write_text(longer, encoding="utf-8")
+    edit(
+        Path("mine"), "parameters.yaml", "thigh_length: {value: 0.22", "thigh_length: {value: 0.33"
+    )
     same, changed = compare_twin(vendor, poses=10), compare_twin(vendor, Path("mine"), poses=10)
     assert changed.design.mass > same.design.mass
     gaps = {pair.joint: pair.anchor_gap for pair in changed.links}
     assert gaps["FL_knee"] == pytest.approx(0.11, abs=1e-9)
     assert gaps["FL_pitch"] == pytest.approx(0.0, abs=1e-9)
+
+
+def renamed(old: str, new: str) -> None:
+    """Rename a joint of the imported twin."""
+    tree = Path("mine/tree.yaml")
+    tree.write_text(tree.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
 
 
 def test_a_spec_of_another_robot_is_refused(vendor: Path) -> None:
@@ -239,56 +234,48 @@ def test_a_spec_of_another_robot_is_refused(vendor: Path) -> None:
 
 @SHARED
 @pytest.mark.parametrize("name", ["waist_yaw_joint", "waist_roll_joint", "waist_pitch_joint"])
-def test_a_spec_that_lacks_a_joint_below_the_trunk_is_refused(name: str, tmp_path: Path) -> None:
+def test_a_spec_that_lacks_a_joint_below_the_trunk_is_refused(name: str) -> None:
     path = ROBOTS / "twins" / "g1" / "g1_29dof_rev_1_0.urdf"
-    import_robot(path, tmp_path / "mine")
-    tree = tmp_path / "mine" / "tree.yaml"
-    tree.write_text(tree.read_text(encoding="utf-8").replace(name, "twist"), encoding="utf-8")
+    import_robot(path, "mine")
+    renamed(name, "twist")
     with pytest.raises(DraftError, match=f"lacks '{name}', which lies between"):
-        compare_twin(path, str(tmp_path / "mine"))
+        compare_twin(path, "mine")
 
 
 def test_a_joint_that_the_spec_lacks_is_told_and_left_out(vendor: Path) -> None:
     import_robot(vendor, Path("mine"))
-    tree = Path("mine/tree.yaml")
-    tree.write_text(tree.read_text(encoding="utf-8").replace("_knee", "_bend"), encoding="utf-8")
-    text = tree.read_text(encoding="utf-8").replace("name: knee", "name: bend")
-    tree.write_text(text, encoding="utf-8")
+    renamed("_knee", "_bend")
+    renamed("name: knee", "name: bend")
     found = compare_twin(vendor, "mine", poses=3)
-    assert found.unmatched == tuple(f"{leg}_knee" for leg in ("FL", "FR", "RL", "RR"))
+    assert found.unmatched == tuple(f"{leg}_knee" for leg in LEGS)
     assert len(found.joints) == 8
 
 
-def test_a_body_without_a_mass_is_named(vendor: Path) -> None:
-    text = vendor.read_text(encoding="utf-8")
-    start = text.index('<link name="FL_thigh">')
-    end = text.index("</inertial>", start) + len("</inertial>")
-    vendor.write_text(text[:start] + '<link name="FL_thigh">' + text[end:], encoding="utf-8")
-    notes = list(map(str, compare_twin(vendor, poses=3).files.reduced.notes))
-    assert any("states no mass for 1 link, 'FL_thigh'" in note for note in notes)
+def test_a_body_without_a_mass_is_named() -> None:
+    bare = quadruped().replace(link("FL_thigh"), '<link name="FL_thigh"></link>')
+    found = compare_twin(written(bare), poses=3)
+    assert notes(found.files, "states no mass for 1 link, 'FL_thigh'")
 
 
-def test_a_slide_stays_still_while_hinges_are_compared(vendor: Path) -> None:
-    text = vendor.read_text(encoding="utf-8")
-    slides = text.replace('name="FL_pitch" type="revolute"', 'name="FL_pitch" type="prismatic"')
+def test_a_slide_stays_still_while_hinges_are_compared() -> None:
+    slides = quadruped().replace(
+        'name="FL_pitch" type="revolute"', 'name="FL_pitch" type="prismatic"'
+    )
     slides = slides.replace('lower="-1" upper="1.5"', 'lower="-0.1" upper="0.1"')
-    vendor.write_text(slides, encoding="utf-8")
-    found = compare_twin(vendor, poses=3)
+    found = compare_twin(written(slides), poses=3)
     assert "FL_pitch" in found.joints
     assert np.isfinite(found.inertia.values).all()
 
 
-def test_a_robot_without_masses_is_refused(vendor: Path) -> None:
-    Path("light.urdf").write_text(quadruped(factor=0.0), encoding="utf-8")
+def test_a_robot_without_masses_is_refused() -> None:
     with pytest.raises(DraftError, match=r"light.urdf gives no masses"):
-        compare_twin(Path("light.urdf"))
+        compare_twin(written(quadruped(factor=0.0), "light.urdf"))
 
 
 def test_a_held_part_counts_where_it_hangs(vendor: Path) -> None:
     more = link("tail", 2.0) + joint("wag", "body", "tail", (-0.3, 0, 0), limit='effort="0"')
     before = compare_twin(vendor, poses=2)
-    vendor.write_text(quadruped(more), encoding="utf-8")
-    after = compare_twin(vendor, poses=2)
+    after = compare_twin(written(quadruped(more)), poses=2)
     assert after.vendor_mass == pytest.approx(before.vendor_mass + 2.0)
     assert after.links[0].vendor.mass == pytest.approx(before.links[0].vendor.mass + 2.0)
 
@@ -316,53 +303,43 @@ def test_the_record_is_plain_json_with_residuals(vendor: Path) -> None:
     assert abs(thigh["com_shift"][1]) > 0.01  # outboard, the same on both sides
 
 
-def test_the_command_prints_and_writes(vendor: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["twin", "beast.urdf", "--poses", "5"]) == 0
-    out = capsys.readouterr().out
+def test_the_command_prints_and_writes(vendor: Path) -> None:
+    out = printed("twin", vendor, "--poses", "5")
     assert "thigh" in out
     assert "M(q): median error" in out
-    assert main(["twin", "beast.urdf", "--poses", "5", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["poses"] == 5
+    assert json.loads(printed("twin", vendor, "--poses", "5", "--json"))["poses"] == 5
 
 
 BAD = {
-    "nothing": ([], "no robot is named"),
-    "both": (["beast.urdf", "--all", "."], "both FILE and --all are given"),
-    "no file": (["none.urdf"], "none.urdf: file not found"),
-    "one pose": (["beast.urdf", "--poses", "1"], "--poses 1 is not from 2 to 100000"),
-    "seed": (["beast.urdf", "--seed", "-1"], "--seed -1 is below 0"),
-    "robot": (["beast.urdf", "--without", "gg1"], "there is no robot 'gg1' to hold out"),
-    "spec": (["beast.urdf", "--spec", "none"], "none"),
-    "folder": (["--all", "empty"], "no descriptions here"),
-    "workers": (["--all", ".", "--workers", "0"], "--workers 0 is below 1"),
-    "alone": (["beast.urdf", "--workers", "2"], "--workers cannot be combined with one FILE"),
-    "mixed": (["--all", ".", "--spec", "mine"], "--spec cannot be combined with --all"),
+    "nothing": ("", "no robot is named"),
+    "both": ("beast.urdf --all .", "both FILE and --all are given"),
+    "no file": ("none.urdf", "none.urdf: file not found"),
+    "one pose": ("beast.urdf --poses 1", "--poses 1 is not from 2 to 100000"),
+    "seed": ("beast.urdf --seed -1", "--seed -1 is below 0"),
+    "robot": ("beast.urdf --without gg1", "there is no robot 'gg1' to hold out"),
+    "spec": ("beast.urdf --spec none", "none"),
+    "folder": ("--all empty", "no descriptions here"),
+    "workers": ("--all . --workers 0", "--workers 0 is below 1"),
+    "alone": ("beast.urdf --workers 2", "--workers cannot be combined with one FILE"),
+    "mixed": ("--all . --spec mine", "--spec cannot be combined with --all"),
 }
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_cannot_be_compared_is_named(
-    vendor: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_compared_is_named(vendor: Path, name: str) -> None:
     Path("empty").mkdir()
     arguments, words = BAD[name]
-    assert main(["twin", *arguments]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("error: ")
-    assert words in captured.err
+    assert words in refusal("twin", *arguments.split())
 
 
 @pytest.mark.slow
-def test_all_twins_of_a_folder_make_one_table(
-    vendor: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_all_twins_of_a_folder_make_one_table() -> None:
     Path("robots").mkdir()
     for name, factor in (("one", 1.0), ("two", 2.0)):
-        Path(f"robots/{name}.urdf").write_text(quadruped(factor=factor), encoding="utf-8")
-    Path("robots/bad.urdf").write_text("<robot", encoding="utf-8")
-    assert main(["twin", "--all", "robots", "--workers", "2", "--poses", "5", "--json"]) == 1
-    table = json.loads(capsys.readouterr().out)
+        written(quadruped(factor=factor), f"robots/{name}.urdf")
+    written("<robot", "robots/bad.urdf")
+    every = ("twin", "--all", "robots", "--workers", "2", "--poses", "5", "--json")
+    table = json.loads(printed(*every, code=1, progress=True))
     assert [row["robot"] for row in table["robots"]] == ["one", "two"]
     assert table["robots"][0]["ratio"] == pytest.approx(2 * table["robots"][1]["ratio"], rel=1e-5)
     assert table["refused"][0]["robot"] == "bad"

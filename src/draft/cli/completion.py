@@ -7,12 +7,13 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, get_args, get_origin, get_type_hints
 
 from draft.cli import COMMANDS, Function, functions
 from draft.design.references import shipped_designs
 from draft.errors import DraftError
 from draft.files import write
+from draft.settings import choices
 
 SHELLS = ("bash", "zsh")
 _TOP_OPTIONS = ("--help", "--version", "--install-completion")
@@ -102,8 +103,8 @@ def _entry(command: str, function: Function, subcommands: tuple[str, ...]) -> En
             continue
         if get_origin(_without_none(kind)) is tuple:
             repeated.append(name)
-        choices = _choices(kind)
-        values[name] = Values(choices) if choices else _designs(metavar)
+        words = tuple(map(str, choices(kind)))
+        values[name] = Values(words) if words else _designs(metavar)
     options = tuple(name for name in (*values, *flags) if name)
     return Entry(command, subcommands, options, tuple(flags), tuple(repeated), values)
 
@@ -136,13 +137,6 @@ def _without_none(kind: object) -> object:
     """Return a type without None, if it allows None."""
     kinds = [one for one in get_args(kind) if one is not type(None)]
     return kinds[0] if len(kinds) == 1 and type(None) in get_args(kind) else kind
-
-
-def _choices(kind: object) -> tuple[str, ...]:
-    """Return the values of a Literal, alone or inside another type."""
-    if get_origin(kind) is Literal:
-        return get_args(kind)
-    return next((found for one in get_args(kind) if (found := _choices(one))), ())
 
 
 def _designs(metavar: str) -> Values:

@@ -116,23 +116,35 @@ def _open(names: Sequence[str], options: Options) -> list[Run]:
     return runs
 
 
-def _tests(runs: Sequence[Run], asked: Sequence[str] | None, force: bool) -> list[Sequence[str]]:
+def _tests(
+    runs: Sequence[Run], asked: Sequence[str] | None, force: bool
+) -> Sequence[Sequence[str]]:
     """Return the names of each run's skill tests."""
     from draft.learn.measuring.evaluation import usual
-    from draft.learn.measuring.levels import check_stage, skill_tests
 
-    found = []
-    for run in runs:
-        stage = run.plan.stage
-        own = usual(run)
-        names = own if asked is None else asked if force else tuple(n for n in asked if n in own)
-        if not names and asked is not None:
-            check_stage(skill_tests(asked), stage, run.folder)
-        found.append(names)
-    for name in asked or ():
+    own = [usual(run) for run in runs]
+    if asked is None or force:
+        return [asked or names for names in own]
+    found = [tuple(name for name in asked if name in names) for names in own]
+    for run, names in zip(runs, found, strict=True):
+        if not names:
+            raise _of_other_stage(asked[0], run)
+    for name in asked:
         if not any(name in names for names in found):
-            check_stage(skill_tests((name,)), runs[0].plan.stage, runs[0].folder)
+            raise _of_other_stage(name, runs[0])
     return found
+
+
+def _of_other_stage(name: str, run: Run) -> DraftError:
+    """Error of a skill test that is for policies of other stages."""
+    from draft.learn.measuring.evaluation import usual
+    from draft.learn.measuring.levels import stages_of
+
+    cause = (
+        f"test '{name}' is for policies of stage {stages_of(name)}, and {run.folder} is of stage "
+        f"{run.plan.stage}"
+    )
+    return DraftError(cause, f"use --test {','.join(usual(run))}, or add --force")
 
 
 def _all(evaluations: Sequence[Evaluation], options: Options) -> int:

@@ -34,7 +34,6 @@ Vary = Annotated[
         help_behavior_hint="(required)",
     ),
 ]
-Seed = Annotated[int, tyro.conf.arg(metavar="N", help="Seed of the sampler.")]
 PARTS_KEPT = f"the parts done so far are kept; {AGAIN}"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as jsons
 import math
+from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -18,14 +19,15 @@ from draft.cli.options import (
     DESIGN_FORMS,
     DesignName,
     JsonOutput,
-    LearnedPolicy,
     Payload,
     Values,
     open_design,
 )
+from draft.cli.settings_options import with_options
 from draft.design import Design
 from draft.errors import DraftError
-from draft.metrics import LEARNED, METRICS, find, of_design, of_model, of_policy
+from draft.learn.measuring.evaluation_options import SeeingPolicy
+from draft.metrics import LEARNED, METRICS, find, of_design, of_model
 from draft.metrics.statics import joint_margins
 from draft.values import scalar
 
@@ -40,9 +42,11 @@ OptionalDesign = Annotated[
 ARROWS = {"more": "more is better", "less": "less is better", "": ""}
 
 
+@with_options(SeeingPolicy)
 def main(
     reference: OptionalDesign = None,
     /,
+    *,
     design: DesignName = None,
     values: Values = (),
     payload: Payload = None,
@@ -50,10 +54,11 @@ def main(
         bool,
         tyro.conf.arg(help="Also measure what it does with a policy (the extra learn; seconds)."),
     ] = False,
-    policy: LearnedPolicy = None,
+    chosen: SeeingPolicy,
     json: JsonOutput = False,
 ) -> int:
     """Show what a design can do without learning; without a design, list every metric."""
+    policy = chosen.policy
     if policy is not None and not learned:
         raise DraftError("--policy is for learned metrics", "add --learned")
     if reference is None:
@@ -66,6 +71,8 @@ def main(
     resolved, _ = open_design(reference, design, values, payload)
     found = measure(resolved)
     if learned:
+        from draft.learn.measuring.policy_metrics import of_policy
+
         print_policy(policy)
         with if_interrupted(NOTHING):
             measured = of_policy(resolved, policy=policy, outside=True)
@@ -109,7 +116,7 @@ def _list() -> Table:
     return table
 
 
-def _outside(design: Design, policy: str | None) -> str:
+def _outside(design: Design, policy: str | Path | None) -> str:
     """What of a design lies outside the region of validity of a policy; "" for nothing."""
     from draft.learn.bodies.legged import legged_robot
     from draft.learn.measuring.policies import open_source

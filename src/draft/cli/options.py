@@ -96,28 +96,12 @@ KneeDrive = Annotated[
     ),
 ]
 JsonOutput = Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")]
-DeviceOption = Annotated[str, tyro.conf.arg(metavar="DEVICE", help="auto, cpu, cuda or cuda:1.")]
-LearnedPolicy = Annotated[
-    str | None,
-    tyro.conf.arg(
-        metavar="RUN|FILE.onnx",
-        help="Policy of learned metrics, which observes its design: a run of 'draft train' with "
-        "--see-design, or an exported one.",
-        help_behavior_hint="(default: the policy of quadrupeds that ships)",
-    ),
-]
 OwnPolicies = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
         metavar="FILE.onnx ...",
         help="Policies to walk with before those that ship, from 'draft play RUN --onnx'.",
         help_behavior_hint="(default: none)",
-    ),
-]
-EngineOption = Annotated[
-    Literal["auto", "native", "warp"],
-    tyro.conf.arg(
-        help="Physics: native MuJoCo on the CPU, or MuJoCo Warp; auto is native without a GPU."
     ),
 ]
 HostOption = Annotated[

@@ -12,14 +12,13 @@ import tyro
 
 from draft.cli.options import (
     DESIGN_FORMS,
-    DeviceOption,
-    EngineOption,
     HostOption,
     OwnPolicies,
     PortOption,
     TokenOption,
 )
 from draft.cli.play_output import FRAMES, Output, output
+from draft.cli.settings_options import with_options
 from draft.cli.spelling import spelt
 from draft.design import Design
 from draft.design.references import find_design
@@ -27,6 +26,8 @@ from draft.errors import DraftError, counted, suggest
 from draft.extras import need
 from draft.files import write
 from draft.learn.engine.machine import choose, devices
+from draft.learn.measuring.evaluation_options import OnDevice
+from draft.learn.policy.play_options import Course, PlaySettings
 from draft.learn.policy.policy import designs, short
 from draft.learn.silence import quiet
 from draft.learn.training.run import is_run, open_run
@@ -39,6 +40,8 @@ MOST_ROBOTS = 64
 _SPECIAL = ", ".join(designs())  # Designs with policies of their own.
 
 
+@with_options(OnDevice)
+@with_options(PlaySettings, without=("seed",))
 def main(
     run: Annotated[
         tyro.conf.Positional[str],
@@ -49,6 +52,7 @@ def main(
         ),
     ],
     /,
+    *,
     skill: Annotated[
         Literal["walk", "run", "climb", "push"] | None,
         tyro.conf.arg(
@@ -83,31 +87,7 @@ def main(
             help_behavior_hint="(default: as in training)",
         ),
     ] = None,
-    command: Annotated[
-        tuple[float, float, float] | None,
-        tyro.conf.arg(
-            metavar="VX VY WZ",
-            help="Commanded velocity [m/s, m/s, rad/s].",
-            help_behavior_hint="(default: straight ahead, as fast as suits the policy)",
-        ),
-    ] = None,
-    step: Annotated[
-        float | None,
-        tyro.conf.arg(
-            metavar="M",
-            help="Height of the steps ahead [m]; for designs.",
-            help_behavior_hint="(default: 0.1 for climb, else no steps)",
-        ),
-    ] = None,
-    kick: Annotated[
-        float | None,
-        tyro.conf.arg(
-            metavar="M/S",
-            help="Largest kick along x and y, every few seconds [m/s]; for designs.",
-            help_behavior_hint="(default: 2 for push, else no kicks)",
-        ),
-    ] = None,
-    seconds: Annotated[float, tyro.conf.arg(metavar="S", help="Length of the video [s].")] = 8.0,
+    settings: PlaySettings,
     robots: Annotated[int, tyro.conf.arg(metavar="N", help="Number of robots of a run.")] = 1,
     out: Annotated[
         str | None,
@@ -134,18 +114,14 @@ def main(
             help_behavior_hint="(default: no ONNX)",
         ),
     ] = None,
-    device: DeviceOption = "auto",
-    engine: EngineOption = "auto",
+    on: OnDevice,
     host: HostOption = "127.0.0.1",
     port: PortOption = 8080,
     token: TokenOption = None,
 ) -> int:
     """Show what a policy can do: as a video, in the browser (--web), or as a file (--onnx)."""
-    from draft.learn.policy.playback import check
-
     if not 0 < robots <= MOST_ROBOTS:
         raise DraftError(f"--robots {robots} is not from 1 to {MOST_ROBOTS}", "such as 4")
-    check(command, step, kick, seconds)
 
     def make_output(video: Path, policy: Path) -> Output:
         return output(
@@ -155,23 +131,24 @@ def main(
             strip=strip,
             onnx=onnx,
             web=web,
-            seconds=seconds,
+            seconds=settings.seconds,
             address=(host, port, token),
         )
 
     if not is_run(Path(run)):
         opened = _design(run)
         _only_for_runs(checkpoint=checkpoint, member=member, ground=ground, robots=robots)
-        return _play_design(opened, skill, policy, (command, step, kick), make_output)
-    for name, value in (("skill", skill), ("step", step), ("kick", kick), ("policy", policy)):
+        return _play_design(opened, skill, policy, settings, make_output)
+    of_designs = {"skill": skill, "policy": policy, "step": settings.step, "kick": settings.kick}
+    for name, value in of_designs.items():
         if value not in (None, ()):
             cause = f"--{name} is for designs, and '{run}' is a run of 'draft train'"
             raise DraftError(cause, f"omit --{name}, or name a design")
     opened = open_run(Path(run))
     iteration, _ = opened.checkpoint(checkpoint)
     asked = make_output(opened.folder / "play.mp4", opened.folder / "policy.onnx")
-    chosen = devices(device)[0]
-    stepped = choose(engine, [chosen])
+    chosen = devices(on.device)[0]
+    stepped = choose(on.engine, [chosen])
     quiet()
     need("mjlab", "learn")
     print(spelt(opened.policy_line(iteration)), flush=True)
@@ -179,7 +156,9 @@ def main(
 
     # An exported policy needs no ground, and a plane is quick to make.
     where = ground if asked.web or asked.films else "flat"
-    player = Player(opened, chosen, checkpoint, member, where, robots, command, stepped.name)
+    player = Player(
+        opened, chosen, checkpoint, member, where, robots, settings.command, stepped.name
+    )
     with contextlib.closing(player):
         if asked.onnx is not None:
             _export(player, opened, asked.onnx)
@@ -211,7 +190,7 @@ def _play_design(
     design: Design,
     skill: str | None,
     own: Sequence[str],
-    given: tuple[tuple[float, float, float] | None, float | None, float | None],
+    course: Course,
     make_output: Callable[[Path, Path], Output],
 ) -> int:
     """Show a design in plain MuJoCo with the policy that fits it best."""
@@ -223,7 +202,7 @@ def _play_design(
     if asked.onnx is not None and (own or name not in designs()):
         cause = f"--onnx is for runs and for {_SPECIAL}: the policy of others has other joints"
         raise DraftError(cause, "omit --onnx")
-    robot, warning = playback(design, skill, own, *given)
+    robot, warning = playback(design, skill, own, course)
     chosen = robot.policy
     if asked.onnx is not None:
         write(asked.onnx, chosen.file.read_bytes())

@@ -18,7 +18,7 @@ from draft.cli.completion import spellings
 from draft.errors import DraftError, Problem
 
 _ARGUMENT = re.compile(r"`(\w+)(?:=([^`]+))?`")
-_CALL = re.compile(r"`draft\.(\w+)(?:\(([^`]*)\))?`")
+_CALL = re.compile(r"`draft\.(\w+)(?:\.(\w+))?(?:\(([^`]*)\))?`")
 
 
 # Function of the command that runs.
@@ -56,14 +56,17 @@ def _problem(problem: Problem) -> Problem:
 
 def _command(found: re.Match[str]) -> str:
     """Return the command of a call; what is no call of a command stays as it is."""
-    main = functions(found[1])[0] if found[1] in COMMANDS else None
+    command, subcommand, values = found.groups()
+    main, subcommands = functions(command) if command in COMMANDS else (None, {})
+    main = subcommands.get(subcommand) if subcommand else main
     try:
-        call = ast.parse(f"_({found[2] or ''})", mode="eval").body
+        call = ast.parse(f"_({values or ''})", mode="eval").body
     except SyntaxError:
         return found[0]
     if main is None or not isinstance(call, ast.Call):
         return found[0]
-    words, options = ["draft", found[1], *map(_word, call.args)], spellings(main)
+    words, options = ["draft", command, *[subcommand] * bool(subcommand)], spellings(main)
+    words += map(_word, call.args)
     for one in call.keywords:
         words += [options.get(one.arg or "", ""), _word(one.value)]
     return f"'{' '.join(words)}'"

@@ -8,9 +8,13 @@ from typing import Annotated
 import tyro
 
 from draft.cli.interrupted import AGAIN, if_interrupted
-from draft.cli.options import EngineOption, JsonOutput, check_folder
+from draft.cli.options import JsonOutput, check_folder
+from draft.cli.settings_options import with_options
+from draft.errors import DraftError
+from draft.study.options import RunOptions
 
 
+@with_options(RunOptions)
 def main(
     file: Annotated[
         tyro.conf.Positional[str],
@@ -20,6 +24,7 @@ def main(
         ),
     ],
     /,
+    *,
     out: Annotated[
         str | None,
         tyro.conf.arg(
@@ -35,50 +40,7 @@ def main(
         bool,
         tyro.conf.arg(help="Print the jobs and an estimate of their hours, and write nothing."),
     ] = False,
-    minutes: Annotated[
-        float | None,
-        tyro.conf.arg(
-            metavar="M",
-            help="Time limit [min]; repeat the command to resume.",
-            help_behavior_hint="(default: no limit)",
-        ),
-    ] = None,
-    device: Annotated[
-        str,
-        tyro.conf.arg(
-            metavar="DEVICE",
-            help="auto (all GPUs, or the CPU), cpu, cuda:1, or numbers of GPUs such as 0,1.",
-        ),
-    ] = "auto",
-    workers: Annotated[
-        int | None,
-        tyro.conf.arg(
-            metavar="N",
-            help="Number of jobs at once.",
-            help_behavior_hint="(default: one per GPU; on a CPU one that uses all cores)",
-        ),
-    ] = None,
-    engine: EngineOption = "auto",
-    replicas: Annotated[
-        int | None,
-        tyro.conf.arg(
-            metavar="N",
-            help="Number of processes of each training on a CPU.",
-            help_behavior_hint="(default: one per physical core, shared by the jobs at once)",
-        ),
-    ] = None,
-    ray: Annotated[
-        bool,
-        tyro.conf.arg(help="Run on a Ray cluster that shares the folder, not on this machine."),
-    ] = False,
-    address: Annotated[
-        str | None,
-        tyro.conf.arg(
-            metavar="HOST:PORT",
-            help="Address of the Ray cluster.",
-            help_behavior_hint="(default: this machine's)",
-        ),
-    ] = None,
+    options: RunOptions,
     rate: Annotated[
         float | None,
         tyro.conf.arg(
@@ -91,37 +53,23 @@ def main(
 ) -> int:
     """Train and evaluate all designs of a study with all seeds; the same command resumes it."""
     check_folder(out)
+    if rate is not None and not dry_run:
+        raise DraftError("--rate is for --dry-run", "add --dry-run, or omit --rate")
     from draft.cli.display.study_output import Screen, print_notes, print_outcome, print_plan
-    from draft.study.placement import Placement, expected_capacity
-    from draft.study.running import check_number, open_study, run_study
+    from draft.study.placement import expected_capacity
+    from draft.study.running import open_study, run_study
 
-    check_number("rate", rate, 1e12)
     if dry_run:
-        placement = Placement(device, workers, engine, replicas, ray, address)
-        placement.check()
-        check_number("minutes", minutes, 10**6)
         from draft.study.costs import estimate
 
         store = open_study(file, out, toy)
         print_notes(store)
-        capacity = expected_capacity(store.study, placement)
+        capacity = expected_capacity(store.study, options)
         print_plan(store, estimate(store, rate, capacity), capacity, json)
         return 0
     kept = f"finished jobs are kept, and of trainings all but the last minute; {AGAIN}"
     with if_interrupted(kept), Screen(silent=json) as screen:
-        outcome = run_study(
-            file,
-            out,
-            toy=toy,
-            minutes=minutes,
-            device=device,
-            workers=workers,
-            engine=engine,
-            replicas=replicas,
-            ray=ray,
-            address=address,
-            watch=screen,
-        )
+        outcome = run_study(file, out, toy=toy, watch=screen, **dict(options))
     print_outcome(outcome, json)
     return 1 if outcome.failures else 0
 
@@ -184,10 +132,10 @@ def results(
 ) -> int:
     """Print collected results: each skill over seeds in both arms, with its provenance."""
     from draft.cli.display.results import print_json, print_tables, write_page
-    from draft.study.report.collected import read
+    from draft.study.report.folder import read
 
-    study = read(Path(folder))
-    others = {Path(other): read(Path(other)) for other in against}
+    study = read(Path(folder), results=True)
+    others = {Path(other): read(Path(other), results=True) for other in against}
     if write is not None:
         write_page(study, Path(folder), Path(write), others)
     elif json:

@@ -10,51 +10,31 @@ import tyro
 
 from draft.cli import explore_options as x
 from draft.cli.interrupted import NOTHING, if_interrupted
-from draft.cli.options import (
-    DesignArgument,
-    DesignName,
-    DeviceOption,
-    EngineOption,
-    LearnedPolicy,
-    Values,
-    check_folder,
-    parse_values,
-)
+from draft.cli.options import DesignArgument, DesignName, Values, check_folder, parse_values
+from draft.cli.settings_options import with_options
 from draft.cli.spelling import spelt
 from draft.errors import counted
-from draft.metrics.learned import REPLICAS, SECONDS
+from draft.learn.measuring.evaluation_options import (
+    BodyRollOuts,
+    SeeingPolicy,
+    SurfaceSettings,
+)
 
 if TYPE_CHECKING:
     from draft.learn.measuring.surface import Surface
 
-POINTS = 20
-DEFAULTS = {"points": POINTS, "replicas": REPLICAS, "seconds": SECONDS, "seed": 0}
 
-
+@with_options(SeeingPolicy)
+@with_options(SurfaceSettings, without=("progress",))
 def main(
     reference: DesignArgument,
     /,
+    *,
     vary: x.Vary = (),
-    policy: LearnedPolicy = None,
-    points: Annotated[
-        int,
-        tyro.conf.arg(
-            metavar="N",
-            help="Points along each range; 20 x 20 designs take about 5 min on two idle cores.",
-        ),
-    ] = POINTS,
-    replicas: Annotated[
-        int, tyro.conf.arg(metavar="N", help="Roll-outs of each design at each speed and kick.")
-    ] = REPLICAS,
-    seconds: Annotated[
-        float,
-        tyro.conf.arg(metavar="S", help="Length of a roll-out, whose last third is measured [s]."),
-    ] = SECONDS,
+    chosen: SeeingPolicy,
+    settings: SurfaceSettings,
     design: DesignName = None,
     values: Values = (),
-    seed: x.Seed = 0,
-    device: DeviceOption = "auto",
-    engine: EngineOption = "auto",
     out: Annotated[
         str | None,
         tyro.conf.arg(
@@ -70,30 +50,21 @@ def main(
     from draft.learn.measuring import surface as surfaces
     from draft.learn.measuring.policies import open_source
 
+    policy = None if chosen.policy is None else str(chosen.policy)
     source = open_source(policy)
     print(spelt(source.line), flush=True)
     robot = find_design(reference, design).resolve(parse_values(values))
     with if_interrupted(NOTHING), x.bar("surface", at_once=True) as progress:
-        found = surfaces.surface(
-            robot,
-            vary,
-            source,
-            points=points,
-            replicas=replicas,
-            seconds=seconds,
-            seed=seed,
-            device=device,
-            engine=engine,
-            progress=progress,
-        )
+        asked = settings.model_copy(update={"progress": progress})
+        found = surfaces.surface(robot, vary, source, **dict(asked))
     folder = Path(out or f"out/{found.robot.replace(':', '-')}-surface")
     robot_words = [reference, *(("--design", design) if design else ())]
-    settings = {"points": points, "replicas": replicas, "seconds": seconds, "seed": seed}
+    recorded = settings.model_dump(include={"points", *BodyRollOuts.model_fields})
     command = ["draft", "surface", *robot_words, "--vary", *vary]
     command += ["--set", *values] if values else []
     command += ["--policy", policy] if policy else []
-    for name, value in settings.items():
-        if value != DEFAULTS[name]:
+    for name, value in recorded.items():
+        if value != SurfaceSettings.model_fields[name].default:
             command += [f"--{name}", str(value).removesuffix(".0")]
     studio = ["draft", "studio", *robot_words, "--walk", *(["--policy", policy] if policy else [])]
     walks = not policy or Path(policy).suffix == ".onnx"  # The studio takes no runs.
@@ -102,7 +73,7 @@ def main(
         "set": list(values),
         "policy": source.name,
         "vary": list(vary),
-        **settings,
+        **recorded,
     }
     shown = shlex.join([*studio, "--set", *values]) if walks else ""
     surfaces.save(found, folder, record, shlex.join(command), shown)

@@ -39,6 +39,8 @@ _DRAWS = 4096
 _CHUNK = 64
 # Slope below which a quantity does not change, except for rounding.
 _STILL = 1e-9
+# Laws whose errors are larger below the torques of their data.
+_SMALL = ("mass", "volume")
 
 
 class Band(NamedTuple):
@@ -65,8 +67,9 @@ def actuator_bands(actuator: Actuator, share: float = 0.9) -> dict[str, Band]:
     Returns:
         A band for each quantity that depends on a trend; stated and measured ones have none.
     """
-    widths = half_widths(actuator, share)
-    within = half_widths(actuator, share, ("mass",), outside=False)
+    widths, within = half_widths(actuator, share), {}
+    if any(_small_sigma(actuator, law) is not None for law in _SMALL):
+        within = half_widths(actuator, share, ("mass",), outside=False)
     bands = {
         quantity: Band(value * exp(-width), value * exp(within.get(quantity, width)))
         for quantity, width in widths.items()
@@ -118,7 +121,7 @@ def half_widths(
 
 def _small_sigma(actuator: Actuator, law: str) -> Value | None:
     """Standard deviation of a law below the torques of its data, 0 within; None where none is."""
-    if law not in ("mass", "volume"):
+    if law not in _SMALL:
         return None
     below = actuator.peak_torque < actuator.laws.trends[law].ranges["peak_torque"][0]
     if not some(below):

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 
 from draft import geometry as g
 from draft.design.design import Body, Design
-from draft.geometry import Rotation, Vector
+from draft.geometry import Frame, Rotation, Vector
 from draft.values import (
     Mask,
     Value,
@@ -38,7 +38,6 @@ from draft.values import (
 CROUCH = 0.878
 # Axes count as parallel above this |cosine| of the angle between them: 18 degrees.
 PARALLEL = 0.95
-Frame = tuple[Vector, Rotation]
 
 
 def tip(body: Body, frame: Frame) -> Vector:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from draft import geometry as g
 from draft.design.actuators import Actuator
 from draft.design.parts import Joint, Link
+from draft.design.solids import Pose, lowest
 from draft.errors import DraftError, counted
-from draft.geometry import Rotation, Vector
+from draft.geometry import Frame, Rotation, Vector
 from draft.laws.structure import MIDDLE
+from draft.lazy import verb
 from draft.spec.primitives.base import Geom
 from draft.spec.primitives.root import TrunkPart
 from draft.values import Mask, Value, brief, either, negate, some
@@ -30,9 +32,8 @@ if TYPE_CHECKING:
 Index = int | np.integer | slice | NDArray[np.integer] | NDArray[np.bool_] | list[int]
 
 
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A body of a design. Vectors are in its own (mirrored) frame.
+class Body(NamedTuple):
+    """A body of a design; a tuple because many are made. Vectors are in its own (mirrored) frame.
 
     Attributes:
         name: unique name.
@@ -122,7 +123,7 @@ class Body:
         if (end := self.end_geom) is not None:
             yield end
 
-    def placed(self, parent: tuple[Vector, Rotation], home: bool = True) -> tuple[Vector, Rotation]:
+    def placed(self, parent: Frame, home: bool = True) -> Frame:
         """Frame of the body, from that of its parent.
 
         Args:
@@ -134,7 +135,7 @@ class Body:
         frame = (here, g.compose(rotation, self.rotation))
         return self.moved(frame, self.joint.home) if home and self.joint is not None else frame
 
-    def moved(self, frame: tuple[Vector, Rotation], by: Value) -> tuple[Vector, Rotation]:
+    def moved(self, frame: Frame, by: Value) -> Frame:
         """Frame with the joint at a value [rad or m], from the frame with the joint at zero."""
         if self.joint is None or not some(by != 0):
             return frame
@@ -372,19 +373,14 @@ class Design:
         masses[self.bodies[0].name] = masses[self.bodies[0].name] + self.trunk.mass
         return masses
 
-    def frames(self, home: bool = False) -> list[tuple[Vector, Rotation]]:
+    def frames(self, home: bool = False) -> list[Frame]:
         """Origin [m] and rotation of every body in the frame of the trunk.
 
         Args:
             home: whether the joints are in the home pose; else all are at zero.
         """
-        frames: list[tuple[Vector, Rotation]] = []
-        for body in self.bodies:
-            if body.parent is None:
-                frames.append((g.ZERO, None))
-                continue
-            frames.append(body.placed(frames[body.parent], home))
-        return frames
+        pose = Pose(self, home)
+        return [pose.frame(i) for i in range(len(self.bodies))]
 
     def lowest(self, home: bool = False) -> Value:
         """Distance from the trunk's origin down to the lowest point of the feet [m].
@@ -394,10 +390,9 @@ class Design:
         Args:
             home: whether the joints are in the home pose; else all are at zero.
         """
-        from draft.design.solids import lowest
-
         return lowest(self, home)
 
+    @verb
     def build(self) -> Model:
         """Compile the design to MJCF, which MuJoCo loads and checks.
 
@@ -413,6 +408,7 @@ class Design:
             raise DraftError(f"this is {counted(self.count, 'design')}", remedy)
         return build(self)
 
+    @verb
     def build_batch(self, rows: NDArray[np.intp] | None = None) -> ModelBatch:
         """Compile N designs at once: a template, and arrays of the fields in which they differ.
 

@@ -9,21 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from draft.design import filter_units
 from draft.design.checks import extended, kinds
-from draft.design.design import Design
+from draft.design.design import Design, SegmentMass
 from draft.design.filter_actuators import ROUNDING, actuator, unused, used
-from draft.design.filter_shape import Frames, below_floor, feet, off_tip, sections
-from draft.design.findings import Finding, note
+from draft.design.filter_shape import below_floor, feet, off_tip, sections
+from draft.design.findings import Finding, each, note
 from draft.design.legs import count
 from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
+from draft.design.solids import Pose
 from draft.design.structure_law import leg_of_trunk, structure_laws
 from draft.errors import Problem, ResolveError, suggest
+from draft.laws.structure import Population
 from draft.values import (
     Mask,
     Value,
@@ -53,20 +56,21 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         ResolveError: `allow` names a finding that does not exist.
     """
     _check_allow(design)
-    home = design.frames(home=True)
+    home = Pose(design, home=True)
+    drives, reuse = used(design), plan.reuse(design.count)
     found = [
         *_physical(design, invalid),
-        *(finding for a in used(design) for finding in actuator(a, plan.own)),
-        *(finding for a in used(design) for finding in filter_units.actuator(a)),
+        *each("actuator", partial(actuator, own=plan.own), drives, reuse),
+        *each("units of actuator", filter_units.actuator, drives, reuse),
         *filter_units.robot(design, plan),
         *actuator_overlaps(design, plan),
-        *_segments(design, plan),
+        *each("segment", partial(_segment, plan.population), design.segments, reuse),
         *_trunk(design),
         *_whole(design, plan, home),
         *_thermal(design),
         *limb_overlaps(design, plan),
         *below_floor(design, plan, home),
-        *sections(design),
+        *each("sections", partial(sections, design), [design.trunk.loft], reuse),
         *off_tip(design, plan),
         *unused(design),
         *extended(design),
@@ -114,38 +118,37 @@ def _physical(design: Design, invalid: Mask) -> Iterator[Finding]:
     )
 
 
-def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Compare structural masses with the trends of the population."""
-    for segment in design.segments:
-        trend = plan.population.segments.get(segment.kind or "")
-        if trend is None:
-            continue
-        if segment.trend is not None:
-            low, high = trend.range
-            yield from note(
-                "outside_data",
-                segment.bodies[0],
-                trend.outside(segment.length),
-                f"length {{value}} of '{segment.bodies[0]}' is outside {low:.3g} to {high:.3g} m, "
-                f"the surveyed lengths of its class ({trend.name.replace('_', ' ')}); its mass per "
-                "metre is that of the edge",
-                f"{plan.population.name} {trend.name}, {trend.formula}, n = {trend.n}",
-                segment.length,
-                None,
-                "m",
-            )
-        limit = 2 * trend(segment.length)
+def _segment(population: Population, segment: SegmentMass) -> Iterator[Finding]:
+    """Compare the structural mass of a segment with the trends of the population."""
+    trend = population.segments.get(segment.kind or "")
+    if trend is None:
+        return
+    if segment.trend is not None:
+        low, high = trend.range
         yield from note(
-            "heavy_link",
+            "outside_data",
             segment.bodies[0],
-            segment.mass > limit * ROUNDING,
-            f"the structural mass {{value}} of '{segment.bodies[0]}' is above {{limit}}, twice "
-            "that of its class",
-            f"{plan.population.name} {trend.name}, {trend.formula}, n = {trend.n}",
-            segment.mass,
-            limit,
-            "kg",
+            trend.outside(segment.length),
+            f"length {{value}} of '{segment.bodies[0]}' is outside {low:.3g} to {high:.3g} m, "
+            f"the surveyed lengths of its class ({trend.name.replace('_', ' ')}); its mass per "
+            "metre is that of the edge",
+            f"{population.name} {trend.name}, {trend.formula}, n = {trend.n}",
+            segment.length,
+            None,
+            "m",
         )
+    limit = 2 * trend(segment.length)
+    yield from note(
+        "heavy_link",
+        segment.bodies[0],
+        segment.mass > limit * ROUNDING,
+        f"the structural mass {{value}} of '{segment.bodies[0]}' is above {{limit}}, twice "
+        "that of its class",
+        f"{population.name} {trend.name}, {trend.formula}, n = {trend.n}",
+        segment.mass,
+        limit,
+        "kg",
+    )
 
 
 def _trunk(design: Design) -> Iterator[Finding]:
@@ -171,7 +174,7 @@ def _trunk(design: Design) -> Iterator[Finding]:
         )
 
 
-def _whole(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
+def _whole(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
     """Compare legs, actuator share and total mass with the population."""
     population = plan.population
     ends = (body.link.end for body in design.bodies)

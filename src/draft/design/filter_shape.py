@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from draft import geometry as g
-from draft.design.design import Body, Design
+from draft.design.design import Design
 from draft.design.findings import Finding, note
 from draft.design.plan import Plan
-from draft.design.solids import Solid, foot_depths, solid
-from draft.geometry import Rotation, Vector
+from draft.design.solids import Pose, Solid, depth, foot_depths
+from draft.spec.primitives.loft import Loft
 from draft.values import Value, is_array, maximum, minimum, some
 
 # Reported difference of the heights of feet: share of the deepest, and at least [m].
@@ -20,15 +21,12 @@ EVEN, LEAST_UNEVEN = 0.02, 0.005
 FAR_OFF = 1.0
 
 
-Frames = list[tuple[Vector, Rotation]]
-
-
-def feet(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
-    """Compare the heights of the feet of legs with knees, from the frames in the home pose."""
-    feet = _uneven(design, plan)
+def feet(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
+    """Compare the heights of the feet of legs with knees, in the home pose."""
+    feet = plan.reuse(design.count).result("uneven", lambda: _uneven(design, plan))
     if len(feet) < 2:
         return
-    depths = foot_depths(design, home, bodies=feet)
+    depths = foot_depths(design, home, feet)
     deepest = maximum(*depths)
     gap = deepest - minimum(*depths)
     yield from note(
@@ -44,47 +42,47 @@ def feet(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
     )
 
 
-def below_floor(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
-    """Compare the lowest points of all parts with the feet, from the frames in the home pose."""
-    down: Vector = (0.0, 0.0, -1.0)
-    placed = _placed(design, plan, home)
-    feet = [
-        part.extent(down) - part.center[2]
-        for body, parts in placed
-        if body.link.end is not None and body.link.end.is_foot
-        for part in parts[-1:]
-    ]
+def below_floor(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
+    """Compare the lowest points of all parts with the feet, in the home pose."""
+    reuse = plan.reuse(design.count)
+    distinct = reuse.result("distinct", lambda: _distinct(design, plan))
+    feet = foot_depths(design, home, distinct)
     if not feet:
         return
     floor = maximum(*feet)
     limit = floor + maximum(EVEN * abs(floor), LEAST_UNEVEN)
     trunk = design.trunk.loft.vertices[:, 2].min(axis=0)
-    for body, parts in placed:
-        # The sphere around a solid tells at once that most are above the floor.
-        low = [part for part in parts if some(part.reach - part.center[2] > limit)]
-        depths = [part.extent(down) - part.center[2] for part in low]
+    for i in distinct:
+        body, parts = design.bodies[i], home.solids(i)
+        # The spheres around solids tell at once that most are above the floor.
+        near = some(reuse.result(("reach", i), _reach, parts) > limit)
+        depths = [depth(part) for part in parts] if near else []
         if body.parent is None:
             depths.append(-trunk if is_array(trunk) else -float(trunk))
         if not depths:
             continue
-        depth = maximum(*depths)
+        lowest = maximum(*depths)
         yield from note(
             "below_floor",
             body.name,
-            depth > limit,
+            lowest > limit,
             f"a part of '{body.name}' is {{value}} below the feet in the home pose",
             "geometry of the home pose",
-            1000.0 * (depth - floor),
+            1000.0 * (lowest - floor),
             None,
             "mm",
         )
 
 
-def _placed(design: Design, plan: Plan, frames: Frames) -> list[tuple[Body, list[Solid]]]:
-    """Bodies with their solids, the end last; of copies on both sides one."""
+def _reach(parts: Sequence[Solid]) -> Value:
+    """Distance from the trunk's origin down to the lowest point of spheres around solids [m]."""
+    return maximum(-math.inf, *(part.reach - part.center[2] for part in parts))
+
+
+def _distinct(design: Design, plan: Plan) -> list[int]:
+    """Indices of the bodies of which no copy on the other side comes before."""
     paths: dict[int, tuple[object, ...]] = {}
     seen: set[object] = set()
-    found: list[tuple[Body, list[Solid]]] = []
     for i, body in enumerate(design.bodies):
         if body.parent is None:
             paths[i] = ()
@@ -92,14 +90,10 @@ def _placed(design: Design, plan: Plan, frames: Frames) -> list[tuple[Body, list
             signs = design.spec.bodies[i].signs
             own = (plan.link_of[i], plan.placement_of[i], signs[0], signs[2])
             path = (*paths[body.parent], own)
-            if path in seen:
-                continue
-            seen.add(path)
-            paths[i] = path
-        else:
-            continue
-        found.append((body, [solid(geom, frames[i]) for geom in body.solids()]))
-    return found
+            if path not in seen:
+                seen.add(path)
+                paths[i] = path
+    return [*paths]
 
 
 def off_tip(design: Design, plan: Plan) -> Iterator[Finding]:
@@ -133,11 +127,10 @@ def off_tip(design: Design, plan: Plan) -> Iterator[Finding]:
         )
 
 
-def sections(design: Design) -> Iterator[Finding]:
+def sections(design: Design, loft: Loft) -> Iterator[Finding]:
     """Compare the place of each section of the trunk with its own width."""
     if all(s.offset is None and s.polygon is None for s in design.spec.root.sections):
         return  # All are centred on the axis of the loft.
-    loft = design.trunk.loft
     points = loft.vertices.reshape(loft.sections, loft.corners, *loft.vertices.shape[1:])
     across = [k for k, name in enumerate("xyz") if name != design.spec.root.axis]
     low, high = points.min(axis=1)[:, across], points.max(axis=1)[:, across]

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 from draft.design.actuators import Actuator
 from draft.design.battery import usual as usual_battery
-from draft.design.design import Design
-from draft.design.findings import Finding, note
+from draft.design.design import Design, SegmentMass
+from draft.design.findings import Finding, each, note
 from draft.design.plan import Plan
 from draft.laws.catalogue import span
 from draft.laws.limits import limits
 from draft.laws.quantities import CORNER, QUANTITIES
+from draft.laws.structure import Population
 from draft.values import (
     Value,
     both,
@@ -105,7 +107,9 @@ def actuator(a: Actuator) -> Iterator[Finding]:
 
 def robot(design: Design, plan: Plan) -> Iterator[Finding]:
     """Compare stated lengths, masses, densities, battery and joint ranges with surveyed robots."""
-    yield from _segments(design, plan)
+    reuse = plan.reuse(design.count)
+    segment = partial(_segment, plan.population)
+    yield from each("units of segment", segment, design.segments, reuse)
     yield from _masses(design, plan)
     yield from _trunk(design, plan)
     yield from _battery(design)
@@ -163,26 +167,24 @@ def _away(value: Value, data: Data) -> Value:
     return where(inside, abs(log(value / data.middle)), math.inf)
 
 
-def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Compare lengths and stated masses of segments with those of their class.
+def _segment(population: Population, segment: SegmentMass) -> Iterator[Finding]:
+    """Compare the length and the stated mass of a segment with those of its class.
 
     `outside_data` and `heavy_link` remark on those that are not refused.
     """
-    population = plan.population
-    for segment in design.segments:
-        known = population.segments.get(segment.kind or "")
-        if segment.trend is None and known is not None:
-            usual = known(segment.length)
-            of, source = f"a link of its class ({known.name}) and length", known.formula
-            data = Data(0.0, usual, 2 * usual, of, source, far=ABOVE)
-            yield from compare(segment.bodies[0], "mass", segment.mass, "kg", data)
-        law = population.segments.get(segment.kind or "", population.segments["other"])
-        low, high = law.range
-        if not some(segment.length > high * LONG):
-            continue
-        of = f"{law.n} surveyed links" + (f" of its class ({law.name})" if segment.kind else "")
-        data = Data(0.0, math.sqrt(low * high), high, of, population.name, LONG, LONG)
-        yield from compare(segment.bodies[0], "length", segment.length, "m", data)
+    known = population.segments.get(segment.kind or "")
+    if segment.trend is None and known is not None:
+        usual = known(segment.length)
+        of, source = f"a link of its class ({known.name}) and length", known.formula
+        data = Data(0.0, usual, 2 * usual, of, source, far=ABOVE)
+        yield from compare(segment.bodies[0], "mass", segment.mass, "kg", data)
+    law = known or population.segments["other"]
+    low, high = law.range
+    if not some(segment.length > high * LONG):
+        return
+    of = f"{law.n} surveyed links" + (f" of its class ({law.name})" if segment.kind else "")
+    data = Data(0.0, math.sqrt(low * high), high, of, population.name, LONG, LONG)
+    yield from compare(segment.bodies[0], "length", segment.length, "m", data)
 
 
 def _masses(design: Design, plan: Plan) -> Iterator[Finding]:
@@ -221,6 +223,8 @@ def _trunk(design: Design, plan: Plan) -> Iterator[Finding]:
 
 def _battery(design: Design) -> Iterator[Finding]:
     """Compare a stated battery with those that are usual for the surveyed robots with batteries."""
+    if not design.battery_stated:
+        return
     law = limits().energy_share
     ends = [usual_battery(mass) for mass in law.range]
     of = f"batteries usual for {law.n} surveyed robots"

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from draft.design.checks import is_error
+from draft.design.reuse import Reuse
 from draft.errors import listed
 from draft.values import Mask, Value, brief, scalar, some
 
 _NAME = re.compile(r"'[^']*'")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -108,6 +110,21 @@ def note(
         return
     severity = "error" if is_error(kind) else "warning"
     yield Finding(kind, severity, where, text, value, limit, unit, source, mask)
+
+
+def each(
+    check: str, find: Callable[[T], Iterable[Finding]], parts: Iterable[T], reuse: Reuse
+) -> Iterator[Finding]:
+    """Findings of a check of each part of a design alone; those of parts that stayed are known.
+
+    Args:
+        check: name of the check.
+        find: it, of one part.
+        parts: the parts.
+        reuse: results of the last design.
+    """
+    for k, part in enumerate(parts):
+        yield from reuse.result(("check", check, k), lambda part: [*find(part)], part)
 
 
 def grouped(findings: Iterable[Finding]) -> list[Finding]:

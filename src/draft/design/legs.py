@@ -16,10 +16,10 @@ from weakref import WeakKeyDictionary
 from draft import geometry as g
 from draft.design.actuators import Actuator
 from draft.design.cached import once
-from draft.design.crouch import Crouch, Frame, carried, is_hinge, leg_frames, rotation_at_zero, tip
+from draft.design.crouch import Crouch, carried, is_hinge, leg_frames, rotation_at_zero, tip
 from draft.design.design import Body, Design
 from draft.design.plan import plan
-from draft.geometry import Vector
+from draft.geometry import Frame, Vector
 from draft.spec import Spec
 from draft.values import Value, cos, maximum, sqrt, where
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 from draft import geometry as g
 from draft.design import solids
 from draft.design.design import Body, Design
 from draft.design.findings import Finding, note
+from draft.design.parts import Joint
 from draft.design.plan import Consecutive, Plan
-from draft.geometry import Vector
+from draft.design.solids import Box, Pose, Solid
+from draft.geometry import Frame, Vector
 from draft.values import Mask, Value, both, clip, every, some
 
 # Positions of a joint at which consecutive actuators are compared.
@@ -18,87 +21,67 @@ _POSITIONS = 9
 
 def actuator_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
     """Consecutive actuators that overlap at every position of their joint."""
-    for pair in plan.consecutive:
-        first, second = design.bodies[pair.first], design.bodies[pair.second]
+    bodies, reuse = design.bodies, plan.reuse(design.count)
+    for k, pair in enumerate(plan.consecutive):
+        path = (bodies[pair.first], *(bodies[i] for i in pair.path))
+        always = reuse.result(("motors", k), partial(_always_overlap, pair), *path)
+        if not some(always):
+            continue
+        joint = _joint(pair, path[1:])
+        slides = joint is not None and joint.slide
         yield from note(
             "actuator_overlap",
-            f"{first.name}/{second.name}",
-            _always_overlap(design, pair),
-            f"the actuators on '{first.name}' and '{second.name}' occupy the same space at every "
-            f"{'position of the slide' if _slides(design, pair) else 'joint angle'}",
+            f"{path[0].name}/{path[-1].name}",
+            always,
+            f"the actuators on '{path[0].name}' and '{path[-1].name}' occupy the same space at "
+            f"every {'position of the slide' if slides else 'joint angle'}",
             "actuator sizes and link lengths",
         )
 
 
-def _always_overlap(design: Design, pair: Consecutive) -> Mask:
+def _always_overlap(pair: Consecutive, first: Body, *path: Body) -> Mask:
     """Whether two consecutive actuators overlap at every position of the joint between them."""
-    bodies = design.bodies
-    motor = bodies[pair.first].motor_geom
-    if motor is None:
+    motor, other = first.motor_geom, path[-1].motor_geom
+    if motor is None or other is None:
         return False
-    a = solids.solid(motor, (g.ZERO, None))
-    joint = None if pair.joint is None else bodies[pair.joint].joint
+    a, joint = solids.solid(motor, g.ORIGIN), _joint(pair, path)
     low, high = joint.range if joint is not None else (0.0, 0.0)
-    nearest = _relative(bodies, pair, clip(0.0, low, high))
-    if nearest is None:
-        return False
-    always = solids.overlap(a, nearest)
-    if joint is None or not some(always) or _turns_in_place(a, design, pair):
+
+    def overlap(by: Value) -> Mask:
+        return solids.overlap(a, solids.solid(other, _frames(pair, path, by)[-1]))
+
+    always = overlap(clip(0.0, low, high))
+    if joint is None or not some(always) or _turns_in_place(a, pair, path):
         return always
     for k in range(_POSITIONS):
-        moved = _relative(bodies, pair, low + (high - low) * (k / (_POSITIONS - 1)))
-        if moved is not None:
-            always = both(always, solids.overlap(a, moved))
+        always = both(always, overlap(low + (high - low) * (k / (_POSITIONS - 1))))
         if not some(always):
             break
     return always
 
 
-def _relative(bodies: tuple[Body, ...], pair: Consecutive, by: Value) -> solids.Solid | None:
-    """Second actuator in the frame of the first, with the joint between them at a value."""
-    path = [pair.second]
-    while path[-1] != pair.first:
-        parent = bodies[path[-1]].parent
-        if parent is None:
-            return None
-        path.append(parent)
-    frame = (g.ZERO, None)
-    for i in reversed(path[:-1]):
-        body = bodies[i]
-        origin = g.add(frame[0], g.rotate(frame[1], body.position))
-        frame = (origin, g.compose(frame[1], body.rotation))
-        if i == pair.joint:
-            frame = body.moved(frame, by)
-    motor = bodies[pair.second].motor_geom
-    return None if motor is None else solids.solid(motor, frame)
+def _joint(pair: Consecutive, path: Sequence[Body]) -> Joint | None:
+    """The joint between two actuators."""
+    return None if pair.joint is None else path[pair.joint].joint
 
 
-def _slides(design: Design, pair: Consecutive) -> bool:
-    """Whether the joint between two actuators is a slide."""
-    joint = None if pair.joint is None else design.bodies[pair.joint].joint
-    return joint is not None and joint.slide
+def _frames(pair: Consecutive, path: Sequence[Body], by: Value) -> list[Frame]:
+    """Frames of the bodies of a path in that of the first actuator, with the joint at a value."""
+    frames = [g.ORIGIN]
+    for k, body in enumerate(path):
+        frame = body.placed(frames[-1], home=False)
+        frames.append(body.moved(frame, by) if k == pair.joint else frame)
+    return frames[1:]
 
 
-def _turns_in_place(a: solids.Solid, design: Design, pair: Consecutive) -> bool:
+def _turns_in_place(a: Solid, pair: Consecutive, path: Sequence[Body]) -> bool:
     """Whether the first actuator is a body of revolution about the axis of the hinge."""
-    bodies = design.bodies
-    if _slides(design, pair):
+    joint = _joint(pair, path)
+    if joint is None or pair.joint is None or joint.slide:
         return False
-    path: list[int] = []
-    i: int | None = pair.joint
-    while i is not None and i != pair.first:
-        path.append(i)
-        i = bodies[i].parent
-    frame = (g.ZERO, None)
-    for i in reversed(path):
-        body = bodies[i]
-        frame = (
-            g.add(frame[0], g.rotate(frame[1], body.position)),
-            g.compose(frame[1], body.rotation),
-        )
-    axis = g.rotate(frame[1], bodies[path[0]].joint_axis)
-    offset = g.subtract(a.center, frame[0])
-    return _parallel(a.axis, axis) and _parallel(offset, axis)
+    origin, rotation = _frames(pair, path, 0.0)[pair.joint]
+    axis = g.rotate(rotation, joint.axis)
+    return _parallel(a.axis, axis) and _parallel(g.subtract(a.center, origin), axis)
 
 
 def _parallel(a: Vector, b: Vector) -> bool:
@@ -109,36 +92,32 @@ def limb_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
     """Limbs that overlap in the neutral pose."""
     if not plan.limb_pairs:
         return
-    frames = design.frames()
-    boxes: dict[int, solids.Box | None] = {}
-    kept: dict[int, list[solids.Solid]] = {}
-    for limb in sorted({i for pair in plan.limb_pairs for i in pair}):
-        found = _solids(design, frames, plan.limbs[limb])
-        if design.count is None:  # for many designs they are large, and computed again where needed
-            kept[limb] = found = list(found)
-        boxes[limb] = solids.box_around(found)
+    bodies, reuse, pose = design.bodies, plan.reuse(design.count), Pose(design, home=False)
+
+    def limb(k: int) -> Iterator[Solid]:
+        """Solids of a limb, body by body, because those of many designs are large."""
+        return (each for i in plan.limbs[k] for each in pose.solids(i))
+
+    def box(k: int) -> Box | None:
+        of = (x for i in plan.limbs[k] for x in (bodies[i], pose.frame(i)))
+        return reuse.result(("box", k), lambda *_: solids.box_around(limb(k)), *of)
+
+    boxes = {k: box(k) for k in sorted({k for pair in plan.limb_pairs for k in pair})}
     for i, j in plan.limb_pairs:
-        box_i, box_j = boxes[i], boxes[j]
-        if box_i is None or box_j is None:
+
+        def overlap(one: Box | None, other: Box | None, i: int = i, j: int = j) -> Mask:
+            if one is None or other is None:
+                return False
+            return solids.any_overlap(solids.boxes_meet(one, other), limb(i), limb(j))
+
+        mask = reuse.result(("limbs", i, j), overlap, boxes[i], boxes[j])
+        if not some(mask):
             continue
-        meet = solids.boxes_meet(box_i, box_j)
-        if not some(meet):
-            continue
-        one, other = (kept.get(k) or _solids(design, frames, plan.limbs[k]) for k in (i, j))
-        first, second = (design.bodies[plan.limbs[k][0]].name for k in (i, j))
+        first, second = (bodies[plan.limbs[k][0]].name for k in (i, j))
         yield from note(
             "limb_overlap",
             f"{first}/{second}",
-            solids.any_overlap(meet, one, other),
+            mask,
             f"the limbs that begin at '{first}' and '{second}' overlap in the neutral pose",
             "geometry in the neutral pose",
         )
-
-
-def _solids(
-    design: Design, frames: list[tuple[Vector, g.Rotation]], bodies: tuple[int, ...]
-) -> Iterator[solids.Solid]:
-    """Solids of some bodies, one at a time, because those of many designs are large."""
-    for k in bodies:
-        for geom in design.bodies[k].solids():
-            yield solids.solid(geom, frames[k])

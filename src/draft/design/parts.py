@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from draft import geometry as g
-from draft.geometry import Rotation, Vector
+from draft.geometry import Frame, Rotation, Vector
 from draft.spec import links, tree
 from draft.spec.evaluate import Evaluator
 from draft.spec.primitives.base import End
@@ -99,6 +99,22 @@ def mirrored(link: Link, signs: Signs) -> Link:
         link.end and link.end.mirrored(signs),
         g.reflect(link.tip, signs),
     )
+
+
+def placed(placement: Placement, parent: Link | None, signs: Signs) -> Frame:
+    """Frame of a body in that of its parent; of the trunk, which has none, the placement itself.
+
+    Args:
+        placement: of its link.
+        parent: link of its parent, as written in its chain.
+        signs: product of the mirrors above it, per axis.
+    """
+    at, rotation = placement
+    if at is None:
+        at = g.ZERO if parent is None else parent.tip
+    if signs == UNMIRRORED:
+        return at, rotation
+    return g.reflect(at, signs), g.mirrored(rotation, signs)
 
 
 def _mirrored_joint(joint: Joint, signs: Signs) -> Joint:

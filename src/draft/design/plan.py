@@ -7,14 +7,15 @@ and are treated once.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from weakref import WeakKeyDictionary
 
+from draft.design.reuse import Reuse
 from draft.laws.actuators import Laws, laws, read_laws
 from draft.laws.catalogue import Part, catalogue, with_rows
 from draft.laws.structure import Population, population, read_population
 from draft.spec import Spec
-from draft.spec.check import rigid_bases
+from draft.spec.check import expressions, rigid_bases
 from draft.spec.graph import order
 from draft.spec.links import Link
 from draft.spec.tree import Body, Placement
@@ -33,6 +34,7 @@ class Segment:
             to the trunk or to a segment of another class.
         members: bodies with a structural member, or an end that is part of the segment.
         exits: bodies whose joints end it: first joints of the next segments.
+        path: bodies below the head down to its exits, or down to its members without exits.
         copies: members of each copy, this one first.
     """
 
@@ -41,6 +43,7 @@ class Segment:
     head: int
     members: tuple[int, ...]
     exits: tuple[int, ...]
+    path: tuple[int, ...]
     copies: tuple[tuple[int, ...], ...]
 
 
@@ -48,11 +51,16 @@ class Segment:
 class Consecutive:
     """Two actuators with no other between them on the path from the trunk outwards.
 
-    `joint` is the body of the single joint between them; None if they are fixed to each other.
+    Attributes:
+        first, second: their bodies.
+        path: bodies below the first one, down to the second one.
+        joint: place in the path of the body of the single joint between them; None if they are
+            fixed to each other.
     """
 
     first: int
     second: int
+    path: tuple[int, ...]
     joint: int | None
 
 
@@ -64,6 +72,7 @@ class Plan:
         order: parameters and actuator classes, each after its inputs.
         links: unique links; `link_of` holds the index for each body.
         placements: unique placements; `placement_of` holds the index for each body.
+        link_reads, placement_reads, root_reads: names of the numbers that each reads.
         segments: unique structural segments.
         consecutive: unique pairs of consecutive actuators.
         limbs: serial runs of bodies.
@@ -71,6 +80,7 @@ class Plan:
         population: structure trends, with the law of the trunk that holds.
         laws: actuator trends.
         own: modules of the spec's own table.
+        last: results of the last single design.
     """
 
     order: list[str]
@@ -78,6 +88,9 @@ class Plan:
     link_of: tuple[int, ...]
     placements: tuple[Placement, ...]
     placement_of: tuple[int, ...]
+    link_reads: tuple[tuple[str, ...], ...]
+    placement_reads: tuple[tuple[str, ...], ...]
+    root_reads: tuple[str, ...]
     segments: tuple[Segment, ...]
     consecutive: tuple[Consecutive, ...]
     limbs: tuple[tuple[int, ...], ...]
@@ -85,8 +98,14 @@ class Plan:
     population: Population
     laws: Laws
     own: tuple[Part, ...] = ()
+    last: Reuse = field(default_factory=Reuse)
+
+    def reuse(self, count: int | None) -> Reuse:
+        """Results that a design of the spec takes over; of N designs none."""
+        return self.last if count is None else _NOTHING
 
 
+_NOTHING = Reuse(keeps=False)
 _plans = WeakKeyDictionary()
 
 
@@ -115,6 +134,9 @@ def _make(spec: Spec) -> Plan:
         link_of=link_of,
         placements=tuple(placements),
         placement_of=placement_of,
+        link_reads=tuple(map(_reads, links)),
+        placement_reads=tuple(map(_reads, placements)),
+        root_reads=_reads(spec.root),
         segments=_segments(bodies, keys),
         consecutive=_consecutive(bodies, keys),
         limbs=limbs,
@@ -123,6 +145,11 @@ def _make(spec: Spec) -> Plan:
         laws=laws(spec.trends) if isinstance(spec.trends, str) else read_laws(spec.trends),
         own=_own(spec),
     )
+
+
+def _reads(written: object) -> tuple[str, ...]:
+    """Names that the expressions of a part as written read."""
+    return tuple(sorted({name for each in expressions(written, set()) for name in each.names}))
 
 
 def _own(spec: Spec) -> tuple[Part, ...]:
@@ -176,15 +203,24 @@ def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Se
         ]
         trend = name if isinstance(name, str) else None
         first = head if leads else members[0]
-        segment = Segment(
-            trend or bodies[members[0]].name, trend, first, tuple(members), tuple(exits), ()
-        )
+        path = sorted({k for j in (exits or members) for k in _between(bodies, first, j)})
+        label = trend or bodies[members[0]].name
+        segment = Segment(label, trend, first, tuple(members), tuple(exits), tuple(path), ())
         shape = tuple((keys[j], _relative(bodies, first, j)) for j in (*members, *exits))
         copies.setdefault((keys[first], trend, shape), []).append(segment)
     return tuple(
         replace(same[0], copies=tuple(segment.members for segment in same))
         for same in copies.values()
     )
+
+
+def _between(bodies: tuple[Body, ...], head: int, body: int) -> list[int]:
+    """Bodies below one body, down to another that is below it; none from a body to itself."""
+    path: list[int] = []
+    while body != head:
+        path.append(body)
+        body = bodies[body].parent or head
+    return path[::-1]
 
 
 def _relative(bodies: tuple[Body, ...], a: int, b: int) -> tuple[float, ...]:
@@ -208,7 +244,9 @@ def _consecutive(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple
             path.append((keys[here], _relative(bodies, i, here)))
             if bodies[here].link.motor is not None:
                 if len(joints) <= 1:
-                    pair = Consecutive(here, i, joints[0] if joints else None)
+                    between = tuple(_between(bodies, here, i))
+                    joint = between.index(joints[0]) if joints else None
+                    pair = Consecutive(here, i, between, joint)
                     found.setdefault(tuple(path), pair)
                 break
     return tuple(found.values())

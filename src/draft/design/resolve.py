@@ -3,36 +3,39 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
-from draft import geometry as g
 from draft.design.actuators import Actuator, size
 from draft.design.battery import trunk_with_battery
 from draft.design.cached import hand_on
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.filter import inspect
 from draft.design.overrides import Table, read_table
-from draft.design.parts import Link, Placement, mirrored, read_link, read_placement
+from draft.design.parts import Link, Placement, mirrored, placed, read_link, read_placement
 from draft.design.plan import Plan, plan
 from draft.design.segments import Skeleton, drawn_radii, weigh
 from draft.design.structure_law import leg_of_trunk, structure_laws
 from draft.errors import DraftError, Location, Problem, ResolveError
-from draft.geometry import Rotation, Vector
+from draft.geometry import Frame
 from draft.laws import catalogue
 from draft.laws.quantities import QUANTITIES
 from draft.laws.structure import MIDDLE
-from draft.spec import Spec
+from draft.spec import Spec, tree
 from draft.spec.evaluate import Evaluator
 from draft.spec.expressions import Expression
 from draft.spec.payload import PLACE
 from draft.spec.primitives.loft import Loft
 from draft.spec.primitives.root import TrunkPart, make_trunk
 from draft.spec.spec import ActuatorClass, Parameter
-from draft.spec.tree import UNMIRRORED, Signs
+from draft.spec.tree import Signs
 from draft.values import Value, is_array
+
+T = TypeVar("T")
 
 
 def resolve(
@@ -69,11 +72,22 @@ def top_of(loft: Loft) -> tuple[Value, Value, Value]:
     return (x, y, top) if is_array(top) else (float(x), float(y), float(top))
 
 
+def _body(written: tree.Body, link: Link, place: Frame, *numbers: Any) -> Body:
+    """Body of a design: as written, its link, its place on its parent, and its other numbers."""
+    return Body(written.name, written.prefix, written.parent, link, *place, *numbers)
+
+
+def _quantities(actuator: Actuator) -> dict[str, Value]:
+    """Quantities of an actuator class by their names in expressions."""
+    return {f"{actuator.name}.{quantity}": getattr(actuator, quantity) for quantity in QUANTITIES}
+
+
 class _Resolver:
     def __init__(self, spec: Spec, p: Plan, table: Table) -> None:
         self.spec = spec
         self.plan = p
         self.table = table
+        self.reuse = p.reuse(table.count)
         self.env: dict[str, Value] = {}
         self.r = Evaluator(self.env)
         self.actuators: dict[str, Actuator] = {}
@@ -85,11 +99,21 @@ class _Resolver:
                 self.actuator(spec.actuators[name[:-1]])
             else:
                 self.parameter(spec.parameters[name])
-        trunk = make_trunk(spec.root, p.population.trunk_density, self.r)
+        density = p.population.trunk_density
+        trunk = self.read("trunk", lambda: make_trunk(spec.root, density, self.r), p.root_reads)
         if spec.payload is not None:
-            self.env.update(zip(PLACE, top_of(trunk.loft), strict=True))
-        links = [read_link(link, self.r) for link in p.links]
-        placements = [read_placement(placement, self.r) for placement in p.placements]
+            top = self.reuse.result("top", top_of, trunk.loft)
+            self.env.update(zip(PLACE, top, strict=True))
+        links = [
+            self.read(("link", i), partial(read_link, link, self.r), reads)
+            for i, (link, reads) in enumerate(zip(p.links, p.link_reads, strict=True))
+        ]
+        placements = [
+            self.read(("placement", i), partial(read_placement, placement, self.r), reads)
+            for i, (placement, reads) in enumerate(
+                zip(p.placements, p.placement_reads, strict=True)
+            )
+        ]
         bodies, segments = self.bodies(links, placements)
         design = Design(
             spec=spec,
@@ -117,6 +141,16 @@ class _Resolver:
     def electronics(self, stated: Expression | None) -> Value | None:
         return None if stated is None else self.r.positive(stated, "the power of the electronics")
 
+    def read(self, place: object, read: Callable[[], T], reads: tuple[str, ...]) -> T:
+        """Evaluate a part of the spec, or take it over if the numbers that it reads are the same.
+
+        Args:
+            place: the part.
+            read: evaluates it.
+            reads: names of these numbers.
+        """
+        return self.reuse.result(place, lambda *_: read(), *map(self.env.__getitem__, reads))
+
     def parameter(self, parameter: Parameter) -> None:
         """Evaluate a parameter and check its bounds."""
         name = parameter.name
@@ -124,7 +158,7 @@ class _Resolver:
         value = self.table.arrays.get(name)
         if value is None:
             value = self.r.number(expression, name)
-        self.env[name] = value
+        self.env[name] = self.reuse.equal(name, value)
         if parameter.bounds is None:
             return
         low, high = parameter.bounds
@@ -169,8 +203,7 @@ class _Resolver:
         self.check_rated(sized, actuator)
         self.check_corner(sized, actuator)
         self.actuators[name] = sized
-        for quantity in QUANTITIES:
-            self.env[f"{name}.{quantity}"] = getattr(sized, quantity)
+        self.env |= self.reuse.result((name, "quantities"), _quantities, sized)
 
     def sized(self, actuator: ActuatorClass, table: Table) -> Actuator:
         """Size an actuator class with the changes of a table."""
@@ -196,9 +229,15 @@ class _Resolver:
             given = name in table.like
             where = table.place(f"actuators.{name}.like") if given else actuator.like_where
             raise ResolveError(Problem(problem.cause, where, problem.remedy)) from None
-        try:
-            by_trend = table.predicted(actuator)
+        by_trend = self.reuse.equal((name, "by trend"), table.predicted(actuator))
+        names = self.reuse.equal((name, "stated"), tuple(stated))
+        numbers = (self.reuse.equal((name, each), value) for each, value in stated.items())
+
+        def sized(*_: object) -> Actuator:
             return size(name, stated, part, actuator.where, self.plan.laws, None, by_trend)
+
+        try:
+            return self.reuse.result((name, "sized"), sized, part, by_trend, names, *numbers)
         except OverflowError:
             raise ResolveError(
                 Problem(f"the numbers of actuator '{name}' are too large", actuator.where)
@@ -246,67 +285,55 @@ class _Resolver:
         """Place every body and distribute the structural mass."""
         spec, p = self.spec, self.plan
         skeleton = self.skeleton(links, placements)
+        reuse = self.reuse
         member_mass: dict[int, Value] = {}
         # Mass of the end, centre of the member, label of the segment.
         shared: dict[int, tuple[Value, Value, str]] = {}
         segments = []
-        for segment in p.segments:
-            weighed = weigh(segment, skeleton, self.r)
+        for k, segment in enumerate(p.segments):
+            weighed = reuse.result(
+                ("segment", k),
+                lambda *_, segment=segment: weigh(segment, skeleton, self.r),
+                *(skeleton.links[i] for i in segment.members),
+                *(skeleton.places[i] for i in segment.path),
+            )
             segments.append(weighed.segment)
             centre = weighed.segment.member_centre
             middle = MIDDLE if centre is None else centre
             for copy in segment.copies:
                 for i, member, end in zip(copy, weighed.members, weighed.ends, strict=True):
                     member_mass[i], shared[i] = member, (end, middle, segment.label)
-        radii = drawn_radii(skeleton, member_mass)
+        radii = drawn_radii(skeleton, member_mass, reuse)
         bodies = []
-        for i, body in enumerate(spec.bodies):
+        for i, written in enumerate(spec.bodies):
             link = skeleton.links[i]
             actuator = self.actuators[link.motor.actuator] if link.motor else None
             end, middle, label = shared.get(i, (0.0, MIDDLE, None))
             if link.end is not None and not link.end.of_segment and link.end.mass is not None:
                 end = link.end.mass
-            bodies.append(
-                Body(
-                    body.name,
-                    body.prefix,
-                    body.parent,
-                    link,
-                    skeleton.positions[i],
-                    skeleton.rotations[i],
-                    member_mass.get(i, 0.0),
-                    end,
-                    middle,
-                    radii[i],
-                    actuator,
-                    label,
-                )
-            )
+
+            member, place = member_mass.get(i, 0.0), skeleton.places[i]
+            numbers = (link, place, member, end, middle, radii[i], actuator, label)
+            bodies.append(reuse.result(("body", i), _body, written, *numbers))
         self.check_moving_masses(bodies)
         return tuple(bodies), tuple(segments)
 
     def skeleton(self, links: list[Link], placements: list[Placement]) -> Skeleton:
         """Place and mirror the link of every body; no later step uses the mirrors."""
-        spec, p = self.spec, self.plan
+        spec, p, reuse = self.spec, self.plan, self.reuse
         copies: dict[tuple[int, Signs], Link] = {}
-        positions: list[Vector] = []
-        rotations: list[Rotation] = []
         own: list[Link] = []
+        places: list[Frame] = []
         for i, body in enumerate(spec.bodies):
             key = (p.link_of[i], body.signs)
             link = copies.get(key)
             if link is None:
-                link = copies[key] = mirrored(links[key[0]], body.signs)
+                link = copies[key] = reuse.result(key, mirrored, links[key[0]], body.signs)
             own.append(link)
+            above = None if body.parent is None else links[p.link_of[body.parent]]
             placement = placements[p.placement_of[i]]
-            at, rotation = placement.at, placement.rotation
-            if at is None:
-                at = g.ZERO if body.parent is None else links[p.link_of[body.parent]].tip
-            if body.signs != UNMIRRORED:
-                at, rotation = g.reflect(at, body.signs), g.mirrored(rotation, body.signs)
-            positions.append(at)
-            rotations.append(rotation)
-        return Skeleton(spec, p, own, positions, rotations)
+            places.append(reuse.result(("place", i), placed, placement, above, body.signs))
+        return Skeleton(spec, p, own, places)
 
     def check_moving_masses(self, bodies: list[Body]) -> None:
         """Check that every joint moves a mass; the dynamics is singular otherwise."""

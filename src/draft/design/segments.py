@@ -12,10 +12,12 @@ from draft import geometry as g
 from draft.design.design import SegmentMass
 from draft.design.parts import Link
 from draft.design.plan import Plan, Segment
+from draft.design.reuse import Reuse
 from draft.errors import Problem, ResolveError
-from draft.geometry import Rotation, Vector
+from draft.geometry import Frame, Vector
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
+from draft.spec.primitives.basic import MemberPart
 from draft.values import Value, clip, is_array, maximum, sqrt
 
 # Range of the centre of a rod of two halves: one half has no mass at its ends.
@@ -31,20 +33,19 @@ class Skeleton:
         spec: the spec.
         plan: its plan.
         links: numbers of every body's link, mirrored.
-        positions: origin of every body in the frame of its parent [m].
-        rotations: rotation of every body in the frame of its parent.
+        places: frame of every body in that of its parent.
     """
 
     spec: Spec
     plan: Plan
     links: Sequence[Link]
-    positions: Sequence[Vector]
-    rotations: Sequence[Rotation]
+    places: Sequence[Frame]
 
     def from_head(self, head: int, body: int, point: Vector) -> Vector:
         """Transform a point of a body to the frame of a body above it, all joints at zero [m]."""
         while body != head:
-            point = g.add(self.positions[body], g.rotate(self.rotations[body], point))
+            origin, rotation = self.places[body]
+            point = g.add(origin, g.rotate(rotation, point))
             parent = self.spec.bodies[body].parent
             body = head if parent is None else parent
         return point
@@ -109,23 +110,25 @@ def _member_centre(
     return clip(centre - (1.0 - centre) * end / maximum(member, LIGHTEST), *CENTRES)
 
 
-def drawn_radii(skeleton: Skeleton, member_mass: dict[int, Value]) -> list[Value]:
+def drawn_radii(skeleton: Skeleton, member_mass: dict[int, Value], reuse: Reuse) -> list[Value]:
     """Drawn radius of the member of every body [m]: stated, or that at the density of the trunk."""
-    link_of = skeleton.plan.link_of
+    link_of, density = skeleton.plan.link_of, skeleton.plan.population.trunk_density
     mass_of = {link_of[i]: mass for i, mass in member_mass.items()}
     known: dict[int, Value] = {}
     for k, link in zip(link_of, skeleton.links, strict=True):
-        if k in known:
-            continue
-        if link.member is None:
-            known[k] = 0.0
-        elif link.member.radius is not None:
-            known[k] = link.member.radius
-        else:
-            volume = mass_of.get(k, 0.0) / skeleton.plan.population.trunk_density
-            length = link.member.length
-            known[k] = clip(sqrt(volume / (math.pi * length)), 0.05 * length, 0.5 * length)
+        if k not in known:
+            mass = mass_of.get(k, 0.0)
+            known[k] = reuse.result(("radius", k), _drawn_radius, link.member, mass, density)
     return [known[k] for k in link_of]
+
+
+def _drawn_radius(member: MemberPart | None, mass: Value, density: float) -> Value:
+    if member is None:
+        return 0.0
+    if member.radius is not None:
+        return member.radius
+    volume, length = mass / density, member.length
+    return clip(sqrt(volume / (math.pi * length)), 0.05 * length, 0.5 * length)
 
 
 def _length(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Value:

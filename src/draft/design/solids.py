@@ -8,14 +8,15 @@ floats or arrays of shape (N,).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from draft import geometry as g
-from draft.geometry import Rotation, Vector
+from draft.design.plan import plan
+from draft.geometry import Frame, Vector
 from draft.spec.primitives.base import Geom
 from draft.values import (
     Mask,
@@ -34,13 +35,14 @@ from draft.values import (
 )
 
 if TYPE_CHECKING:
-    from draft.design.design import Design
+    from draft.design.design import Body, Design
 
 # Solids are shrunk by this share before they are compared, so that faces may touch.
 SLACK = 0.02
 _STEPS = 60
 _TINY = 1e-12
 _SHORT = 1e-9
+_DOWN: Vector = (0.0, 0.0, -1.0)
 
 
 class Cylinder(NamedTuple):
@@ -125,7 +127,7 @@ class Block(NamedTuple):
 Solid = Cylinder | Ball | Block
 
 
-def solid(geom: Geom, frame: tuple[Vector, Rotation]) -> Solid:
+def solid(geom: Geom, frame: Frame) -> Solid:
     """Solid of a geom, in the frame in which the frame of its body is given."""
     origin, rotation = frame
     at = g.add(origin, g.rotate(rotation, geom.center))
@@ -137,6 +139,39 @@ def solid(geom: Geom, frame: tuple[Vector, Rotation]) -> Solid:
     x, y, z = geom.size
     first, second, third = (g.rotate(rotation, axis) for axis in g.IDENTITY)
     return Block(at, (first, second, third), g.scale((x, y, z), 0.5))
+
+
+class Pose:
+    """Frames and solids of the bodies of a design, in the frame of the trunk.
+
+    Args:
+        design: the design.
+        home: whether the joints are in the home pose; else all are at zero.
+    """
+
+    def __init__(self, design: Design, home: bool) -> None:
+        self._bodies, self._home = design.bodies, home
+        self._reuse = plan(design.spec).reuse(design.count)
+        self._frames: dict[int, Frame] = {0: g.ORIGIN}
+
+    def frame(self, body: int) -> Frame:
+        """Origin [m] and rotation of a body by its index."""
+        known = self._frames.get(body)
+        if known is None:
+            one, home = self._bodies[body], self._home
+            above = self.frame(one.parent or 0)
+            known = self._reuse.result(("frame", home, body), type(one).placed, one, above, home)
+            self._frames[body] = known
+        return known
+
+    def solids(self, body: int) -> Sequence[Solid]:
+        """Solids of a body by its index: actuator, member and end."""
+        of = self._bodies[body], self.frame(body)
+        return self._reuse.result(("solids", self._home, body), _solids, *of)
+
+
+def _solids(body: Body, frame: Frame) -> tuple[Solid, ...]:
+    return tuple(solid(geom, frame) for geom in body.solids())
 
 
 def overlap(a: Solid, b: Solid) -> Mask:
@@ -329,47 +364,36 @@ def boxes_meet(a: Box, b: Box) -> Mask:
     return meet
 
 
+def depth(part: Solid) -> Value:
+    """Distance from the trunk's origin down to the lowest point of a solid [m]."""
+    return part.extent(_DOWN) - part.center[2]
+
+
 def lowest(design: Design, home: bool) -> Value:
     """Distance from the trunk's origin down to the lowest point of the feet [m].
 
     Feet are the ends with a site on which a robot may stand. A robot without feet stands on its
     lowest solid.
     """
-    frames = design.frames(home)
-    feet = foot_depths(design, frames)
+    pose, bodies = Pose(design, home), range(len(design.bodies))
+    feet = foot_depths(design, pose, bodies)
     if feet:
         return maximum(*feet)
-    pairs = list(zip(design.bodies, frames, strict=True))
-    down: Vector = (0.0, 0.0, -1.0)
     trunk = -1.0 * design.trunk.loft.vertices[:, 2].min(axis=0)
-    depths: list[Value] = [trunk if is_array(trunk) else float(trunk)]
-    for body, frame in pairs:
-        placed = (solid(geom, frame) for geom in body.solids())
-        depths += [each.extent(down) - each.center[2] for each in placed]
-    return maximum(*depths)
+    depths = [depth(part) for i in bodies for part in pose.solids(i)]
+    return maximum(trunk if is_array(trunk) else float(trunk), *depths)
 
 
-def foot_depths(
-    design: Design,
-    frames: Sequence[tuple[Vector, Rotation]],
-    bodies: Collection[int] | None = None,
-) -> list[Value]:
+def foot_depths(design: Design, pose: Pose, bodies: Iterable[int]) -> list[Value]:
     """Distances from the trunk's origin down to the lowest point of each foot [m].
 
     Feet are the ends with a site on which a robot may stand.
 
     Args:
         design: the design.
-        frames: frame of every body, as `Design.frames` gives them.
-        bodies: indices of the bodies whose feet are meant; default all.
+        pose: its pose.
+        bodies: indices of the bodies whose feet are meant.
     """
-    down: Vector = (0.0, 0.0, -1.0)
-    pairs = zip(design.bodies, frames, strict=True)
-    return [
-        foot.extent(down) - foot.center[2]
-        for i, (body, frame) in enumerate(pairs)
-        if bodies is None or i in bodies
-        if body.link.end is not None and body.link.end.is_foot
-        if (geom := body.end_geom) is not None
-        for foot in (solid(geom, frame),)
-    ]
+    ends = ((i, design.bodies[i].link.end) for i in bodies)
+    feet = [i for i, end in ends if end is not None and end.is_foot]
+    return [depth(foot) for i in feet for foot in pose.solids(i)[-1:]]

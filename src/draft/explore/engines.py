@@ -42,7 +42,7 @@ class Engine(Protocol):
 class LocalEngine:
     """Processes of this machine; a single worker is this process itself."""
 
-    workers: int = 2
+    workers: int
 
     def run(self, tasks: Iterable[int], work: Work) -> Iterator[tuple[int, Any]]:
         """See `Engine`."""

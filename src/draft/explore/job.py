@@ -22,12 +22,13 @@ from draft.design.checks import CHECKS
 from draft.design.references import find_design
 from draft.errors import DraftError, ModelError, RefusedError, counted
 from draft.explore import where
-from draft.explore.settings import LearnedMetrics, Number, Sampled
+from draft.explore.settings import Number, Sampled
 from draft.explore.where import Condition
 from draft.extensions import ExtensionWarning, load
 from draft.extras import own_version
 from draft.laws import actuators, catalogue, structure
-from draft.metrics.learned import digest
+from draft.learn.measuring.evaluation_options import LearnedMetrics
+from draft.learn.measuring.policy_metrics import digest
 from draft.metrics.measure import needs_more
 from draft.spec import Spec
 from draft.spec.payload import with_payload

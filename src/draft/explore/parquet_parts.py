@@ -82,7 +82,7 @@ class Parts:
         if self.folder.exists() and not path.is_file() and _has_other_files(self.folder):
             cause = f"'{self.folder}' is not a folder of a Draft run; it is kept"
             raise DraftError(cause, "choose another `out`")
-        with files.held(self.folder, f"draft {self.manifest['command']}"):
+        with files.held(self.folder, self.manifest["command"]):
             new = not path.is_file()
             if new:
                 files.write(path, json.dumps(self.manifest, indent=1) + "\n")

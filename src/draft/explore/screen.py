@@ -66,9 +66,7 @@ def screen(robot: Robot, settings: ScreenSettings) -> Rows:
     return Rows(out, **run_screen(job, out, engine, settings.watch(job.n)))
 
 
-def run_screen(
-    job: Job, out: Path, engine: Engine | None = None, watch: Watch = lambda done: None
-) -> Summary:
+def run_screen(job: Job, out: Path, engine: Engine, watch: Watch = lambda done: None) -> Summary:
     """Screen designs into one Parquet file.
 
     Until the file is complete, its parts are in a folder beside it; a repeated run resumes.
@@ -76,7 +74,7 @@ def run_screen(
     Args:
         job: job from `draft.explore.job.make`.
         out: file to write; its metadata contain the manifest.
-        engine: engine that does the work; two processes by default.
+        engine: engine that does the work.
         watch: called with the number of designs computed so far.
 
     Returns:
@@ -100,7 +98,7 @@ def run_screen(
         watch(job.n)
         return found["summary"] | {"computed": 0, "seconds": 0.0}
     with Parts(out.with_name(out.name + ".parts"), manifest, job.parts).held() as parts:
-        computed = fill(parts, Work(job, measure), engine or LocalEngine(), watch)
+        computed = fill(parts, Work(job, measure), engine, watch)
         summary = total(parts.done)
         parts.merge(out, {"summary": summary, "findings": list(kinds())})
     return summary | {"computed": computed, "seconds": time.perf_counter() - start}

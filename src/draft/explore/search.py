@@ -109,7 +109,7 @@ def run_search(
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Optuna marks some of these features as experimental
-        with held(out, "draft optimise"):
+        with held(out, "search"):
             study, seen = open_storage(search.manifest(), _directions(search), out, storage)
             run = _Run(search, optuna, study, seen, shared=storage is not None)
             with stored(out, storage, lambda: len(run.seen)):

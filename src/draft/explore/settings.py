@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, SkipValidation
 
+from draft.learn.measuring.evaluation_options import LearnedMetrics
 from draft.settings import Settings, Shown
 from draft.variation.axes import Vary, ranges
 from draft.variation.sampling import Sampler
@@ -55,18 +56,6 @@ class Sampled(Varied):
     """Metrics to compute, one column each."""
     workers: Annotated[int, Field(ge=1, le=1024), Shown("N")] = 1
     """Number of processes."""
-
-
-class LearnedMetrics(Settings):
-    """Settings of metrics that are measured with a policy, such as `learned.top_speed`."""
-
-    policy: Annotated[
-        str | Path | None, Shown("RUN|FILE.onnx", "the policy of quadrupeds that ships")
-    ] = None
-    """Policy of learned metrics, which observes its design: a run, or an exported one."""
-    outside: bool = False
-    """Measure learned metrics outside the policy's region of validity too, as of imports; it may
-    fail there, and `learned.inside` tells them apart."""
 
 
 class ScreenSettings(Sampled):

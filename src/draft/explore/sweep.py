@@ -21,6 +21,7 @@ from draft.explore.parquet_parts import Parts, Summary
 from draft.explore.rows import Part, Rows, Watch, Work, check_size, column, fill, total
 from draft.explore.settings import SweepSettings
 from draft.extras import need
+from draft.learn.measuring.policy_metrics import of_policy
 from draft.settings import takes
 from draft.values import Array
 
@@ -76,9 +77,7 @@ def sweep(robot: Robot, settings: SweepSettings) -> Rows:
     return Rows(out, **run_sweep(job, out, engine, settings.watch(job.n)))
 
 
-def run_sweep(
-    job: Job, out: Path, engine: Engine | None = None, watch: Watch = lambda done: None
-) -> Summary:
+def run_sweep(job: Job, out: Path, engine: Engine, watch: Watch = lambda done: None) -> Summary:
     """Build designs and write a row for each into the parts of a folder.
 
     Designs that the filter refuses and models that MuJoCo rejects are rows with `accepted` false,
@@ -87,7 +86,7 @@ def run_sweep(
     Args:
         job: job from `draft.explore.job.make`.
         out: folder to write; `_manifest.json` identifies its run.
-        engine: engine that does the work; two processes by default.
+        engine: engine that does the work.
         watch: called with the number of designs computed so far.
 
     Returns:
@@ -104,7 +103,7 @@ def run_sweep(
     check_size(job, out)
     start = time.perf_counter()
     with Parts(out, job.manifest(), job.parts).held() as parts:
-        computed = fill(parts, Work(job, measure), engine or LocalEngine(), watch)
+        computed = fill(parts, Work(job, measure), engine, watch)
         summary = total(parts.done)
     return summary | {"computed": computed, "seconds": time.perf_counter() - start}
 
@@ -158,7 +157,7 @@ def build(
     sound = rows[[int(row) not in errors for row in rows]]
     if learned:
         more = {"outside": True} if job.outside else {}
-        measured = m.of_policy(
+        measured = of_policy(
             design, learned, job.policy or None, known=job.digest, rows=sound, **more
         )
         found |= {name: np.asarray(values) for name, values in measured.items()}

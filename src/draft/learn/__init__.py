@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from draft.lazy import on_first_use
+
 if TYPE_CHECKING:
     from draft.learn.measuring.evaluation import evaluate
     from draft.learn.training.run import open_run
@@ -17,18 +19,9 @@ if TYPE_CHECKING:
 __all__ = ["begin", "evaluate", "open_run", "train"]
 
 _MODULES = {
-    "begin": ("draft.learn.training.session", "begin"),
-    "evaluate": ("draft.learn.measuring.evaluation", "evaluate"),
-    "open_run": ("draft.learn.training.run", "open_run"),
-    "train": ("draft.learn.training.train", "train"),
+    "begin": "draft.learn.training.session",
+    "evaluate": "draft.learn.measuring.evaluation",
+    "open_run": "draft.learn.training.run",
+    "train": "draft.learn.training.train",
 }
-
-
-def __getattr__(name: str) -> object:
-    """Import the functions on first use, so that importing a module of this package is fast."""
-    if name not in _MODULES:
-        raise AttributeError(f"module 'draft.learn' has no attribute '{name}'")
-    import importlib
-
-    module, function = _MODULES[name]
-    return getattr(importlib.import_module(module), function)
+__getattr__ = on_first_use(__name__, _MODULES)

@@ -12,10 +12,14 @@ from __future__ import annotations
 
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import TYPE_CHECKING
 
-from draft.metrics.learned import of_policy
+from draft.lazy import on_first_use
 from draft.metrics.measure import of_batch, of_design, of_model
 from draft.metrics.registry import LEARNED, METRICS, Metric, find, metric
+
+if TYPE_CHECKING:
+    from draft.learn.measuring.policy_metrics import of_policy
 
 __all__ = [
     "LEARNED",
@@ -36,6 +40,10 @@ __all__ = [
     "payload_for",
     "travel",
 ]
+
+# A policy is measured by a package that is imported after this one.
+_MODULES = {"of_policy": "draft.learn.measuring.policy_metrics"}
+__getattr__ = on_first_use(__name__, _MODULES)
 
 # Modules in the order in which their metrics are shown; others follow by name.
 _ORDER = ("sizes", "statics", "leaping", "speed", "heat", "energy", "verdict", "impact")

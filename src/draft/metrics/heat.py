@@ -62,9 +62,9 @@ def hold_time(design: Design) -> Value:
     return limits.hold_time(standing_torque_rated(design))
 
 
-def hold_time_fold(share: float = 0.9) -> float:
-    """Fold within which a share of modules held out is of the predicted time to hold a torque."""
-    return _STALLED.band(share)
+def hold_time_fold() -> float:
+    """Fold within which 90 % of modules held out are of the predicted time to hold a torque."""
+    return _STALLED.band(0.9)
 
 
 class Payload(NamedTuple):

@@ -6,7 +6,7 @@ another form is compiled alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 
 import mujoco
@@ -49,13 +49,16 @@ _NUMBERS = {
 
 
 def read_fields(
-    texts: Sequence[Text], names: Sequence[str]
+    texts: Sequence[Text],
+    names: Sequence[str],
+    load: Callable[[int], mujoco.MjModel] | None = None,
 ) -> tuple[mujoco.MjModel, dict[str, NDArray]]:
     """Compile N texts of one topology; those with the template of the first at once.
 
     Args:
         texts: MJCF of the robots, see `draft.model.texts.with_template`.
         names: names of the robots, for messages.
+        load: makes the model of a robot by its number, where it has more than its text says.
 
     Returns:
         The model of the first, and those of FIELDS in which one differs from it, by name, shape
@@ -64,11 +67,16 @@ def read_fields(
     Raises:
         DraftError: MuJoCo does not accept one, or it differs in more than numbers.
     """
-    first = _compiled(texts[0], names[0])
+
+    def compiled(row: int) -> mujoco.MjModel:
+        return load(row) if load else _compiled(texts[row], names[row])
+
+    first = compiled(0)
     fields: dict[str, NDArray] = {}
     alone = np.ones(len(texts), dtype=bool)
     rows = np.array([i for i, text in enumerate(texts) if text.template == texts[0].template])
-    compiler = _compiler([texts[row] for row in rows], first) if follows_mujoco() else None
+    by_arrays = load is None and follows_mujoco()
+    compiler = _compiler([texts[row] for row in rows], first) if by_arrays else None
     if compiler is not None:
         found, sound, _ = compile_fields(compiler, np.arange(len(rows)))
         alone[rows[sound]] = False
@@ -76,7 +84,7 @@ def read_fields(
             fields[name] = _repeated(first, name, len(texts))
             fields[name][rows[sound]] = found[name][sound]
     for row in np.flatnonzero(alone).tolist():
-        model = _compiled(texts[row], names[row]) if row else first
+        model = compiled(row) if row else first
         differing = differences(first, model)
         if others := differing - {*FIELDS, *DERIVED}:
             cause = f"{names[row]} differs from {names[0]} in {', '.join(sorted(others))}"

@@ -8,7 +8,7 @@ numbers, and its density is mass over drawn volume.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -16,14 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft import geometry as g
+from draft.design.actuators import Actuator
 from draft.design.brackets import bracket
 from draft.design.cached import once
 from draft.design.design import Body, Design
+from draft.design.plan import plan
 from draft.errors import DraftError
 from draft.geometry import Vector
 from draft.model.texts import Text, of_template
 from draft.model.xml import Element
 from draft.spec.primitives.base import COLORS, Color, Geom
+from draft.spec.primitives.loft import Loft
 from draft.values import Array, Value, both, either, is_array, scalar, sqrt, where
 
 if TYPE_CHECKING:
@@ -64,14 +67,19 @@ def robot_element(design: Design) -> Element:
     For N designs, every number that differs is an array of shape (N,) among its attribute's
     numbers, as are the coordinates of the trunk's vertices.
     """
-    hanging = _hanging(design.spec)
+    reuse = plan(design.spec).reuse(design.count)
+    axis, loft = design.spec.root.axis, design.trunk.loft
     held = [
-        (body.name, bracket(design, body, solid))
-        for i, body in enumerate(design.bodies)
-        for solid in body.solids()
-        if hanging.get(i) == solid.suffix
+        reuse.result(("bracket", i), _bracket, design.bodies[i], suffix, loft, axis)
+        for i, suffix in _hanging(design.spec).items()
     ]
     return _robot(design, held)
+
+
+def _bracket(body: Body, suffix: str, loft: Loft, axis: str) -> Element:
+    """Geom of the bracket that holds a solid of a body on the trunk."""
+    (held,) = (solid for solid in body.solids() if solid.suffix == suffix)
+    return _geom(body.name, bracket(loft, axis, body, held))
 
 
 @once
@@ -105,47 +113,54 @@ def _gap(model: mujoco.MjModel, data: mujoco.MjData, first: int, second: int) ->
     return mujoco.mj_geomDistance(model, data, first, second, _FAR, None)
 
 
-def _robot(design: Design, brackets: Sequence[tuple[str, Geom]]) -> Element:
-    """Elements of the robot with brackets on its trunk, by the name of the body that each holds."""
-    height = design.lowest()
+def _robot(design: Design, brackets: Sequence[Element]) -> Element:
+    """Elements of the robot with brackets on its trunk."""
+    reuse, trunk = plan(design.spec).reuse(design.count), design.trunk
+    name = design.bodies[0].name
     root = Element("mujoco", model=design.name)
     root.add("compiler", angle="radian", autolimits="true")
-    _defaults(root, design)
-    _trunk_mesh(root.add("asset"), design)
+    root.children.append(reuse.result("defaults", lambda: _defaults(design)))
+    root.add("asset").children.append(reuse.result("mesh", _trunk_mesh, name, trunk.loft))
     world = root.add("worldbody")
     elements: list[Element] = []
     # Names are unique: a geom is named after its body, with a suffix that is unique to its kind.
-    for body in design.bodies:
+    for i, body in enumerate(design.bodies):
         if body.parent is None:
-            element = world.add("body", name=body.name, pos=(0, 0, height))
+            element = world.add("body", name=name, pos=(0, 0, design.lowest()))
             element.add("freejoint", name="floating_base")
             element.add(
                 "geom",
-                name=body.name + design.trunk.suffix,
+                name=name + trunk.suffix,
                 class_="trunk",
-                mesh=body.name,
-                density=design.trunk.density,
+                mesh=name,
+                density=trunk.density,
             )
-            element.add("site", name=design.trunk.site)
-            for name, geom in brackets:
-                _geom(element, name, geom)
+            element.add("site", name=trunk.site)
+            element.children += [*brackets, *_parts(body)]
         else:
-            parent = elements[body.parent]
-            element = parent.add("body", name=body.name, pos=body.position, quat=_quaternion(body))
-            _joint(element, design, body)
-        _parts(element, body)
+            driven = None if body.joint is None else body.joint.actuator
+            actuator = None if driven is None else design.actuators[driven]
+            made = reuse.result(("element", i), _body, body, actuator)
+            element = made.alone()
+            element.children += made.children
+            elements[body.parent].children.append(element)
         elements.append(element)
-    sensor = root.add("sensor")
-    sensor.add("gyro", name="imu_ang_vel", site=design.trunk.site)
-    sensor.add("velocimeter", name="imu_lin_vel", site=design.trunk.site)
-    sensor.add("accelerometer", name="imu_lin_acc", site=design.trunk.site)
-    sensor.add("subtreeangmom", name="root_angmom", body=design.bodies[0].name)
+    root.children.append(reuse.result("sensors", lambda: _sensors(design)))
     return root
 
 
-def _defaults(root: Element, design: Design) -> None:
-    """Add the geom classes. Geoms of the robot touch the floor and objects, not each other."""
-    default = root.add("default")
+def _sensors(design: Design) -> Element:
+    sensor, site = Element("sensor"), design.trunk.site
+    sensor.add("gyro", name="imu_ang_vel", site=site)
+    sensor.add("velocimeter", name="imu_lin_vel", site=site)
+    sensor.add("accelerometer", name="imu_lin_acc", site=site)
+    sensor.add("subtreeangmom", name="root_angmom", body=design.bodies[0].name)
+    return sensor
+
+
+def _defaults(design: Design) -> Element:
+    """Geom classes. Geoms of the robot touch the floor and objects, not each other."""
+    default = Element("default")
     for name, color in colors(design).items():
         kind = default.add("default", class_=name)
         touches = 0 if name == "drawn" else 1
@@ -159,10 +174,10 @@ def _defaults(root: Element, design: Design) -> None:
             mass=0 if name == "drawn" else None,
         )
     default.add("site", size=(0.005,), group=4)
+    return default
 
 
-def _trunk_mesh(asset: Element, design: Design) -> None:
-    loft = design.trunk.loft
+def _trunk_mesh(name: str, loft: Loft) -> Element:
     # MuJoCo reads single precision, and refuses what that has no digits for.
     points = np.where(np.abs(loft.vertices) < _SMALLEST_VERTEX, 0.0, loft.vertices)
     if points.ndim == 2:
@@ -170,46 +185,49 @@ def _trunk_mesh(asset: Element, design: Design) -> None:
     else:
         vertices = tuple(points.reshape(-1, points.shape[2]))
         faces = loft.faces().ravel().tolist() if loft.convex else ()
-    asset.add("mesh", name=design.bodies[0].name, inertia="exact", vertex=vertices, face=faces)
+    return Element("mesh", name=name, inertia="exact", vertex=vertices, face=faces)
 
 
-def _joint(element: Element, design: Design, body: Body) -> None:
-    joint = body.joint
-    if joint is None:
-        return
-    a = design.actuators[joint.actuator] if joint.actuator is not None else None
-    element.add(
-        "joint",
-        name=body.prefix + joint.name,
-        type="slide" if joint.slide else None,
-        axis=body.joint_axis,
-        range=joint.range,
-        limited="false" if joint.continuous else None,
-        armature=a.armature if a else None,
-        damping=a.damping if a else None,
-        frictionloss=a.friction_loss if a else None,
-        actuatorfrcrange=(-a.peak_torque, a.peak_torque) if a else None,
-    )
+def _body(body: Body, actuator: Actuator | None) -> Element:
+    """Element of a body below the trunk with its joint, that an actuator drives, and its parts."""
+    rotation = None if body.rotation is None else g.quaternion(body.rotation)
+    element = Element("body", name=body.name, pos=body.position, quat=rotation)
+    joint, a = body.joint, actuator
+    if joint is not None:
+        element.add(
+            "joint",
+            name=body.prefix + joint.name,
+            type="slide" if joint.slide else None,
+            axis=body.joint_axis,
+            range=joint.range,
+            limited="false" if joint.continuous else None,
+            armature=a.armature if a else None,
+            damping=a.damping if a else None,
+            frictionloss=a.friction_loss if a else None,
+            actuatorfrcrange=(-a.peak_torque, a.peak_torque) if a else None,
+        )
+    element.children += _parts(body)
+    return element
 
 
-def _parts(element: Element, body: Body) -> None:
-    """Add the geoms and sites of one body."""
+def _parts(body: Body) -> Iterator[Element]:
+    """Geoms and sites of a body."""
     for geom in body.geoms():
-        _geom(element, body.name, geom)
+        yield _geom(body.name, geom)
     end = body.link.end
     if end is not None and end.site is not None:
         for suffix, place in zip(end.sites, end.site_places(body.link.tip), strict=True):
-            element.add("site", name=body.prefix + end.site + suffix, pos=place)
+            yield Element("site", name=body.prefix + end.site + suffix, pos=place)
 
 
-def _geom(element: Element, body: str, geom: Geom) -> None:
-    """Add a geom, with the density that gives its mass; a geom without mass has none."""
+def _geom(body: str, geom: Geom) -> Element:
+    """Geom with the density that gives its mass; a geom without mass has none."""
     form, size = geom.form, geom.size
     if form == "cylinder":
         size = (size[0], size[1] / 2)
     elif form == "box":
         size = tuple(side / 2 for side in size)
-    element.add(
+    return Element(
         "geom",
         name=body + geom.suffix,
         class_=geom.kind,
@@ -256,10 +274,6 @@ def _toward_each(axis: Vector) -> tuple[Value, ...]:
     x, y, z = flip * x, flip * y, flip * z
     w = sqrt((1 + z) / 2)
     return (w, -y / (2 * w), x / (2 * w), 0.0)
-
-
-def _quaternion(body: Body) -> tuple[Value, ...] | None:
-    return None if body.rotation is None else g.quaternion(body.rotation)
 
 
 def body_masses(design: Design) -> Array:

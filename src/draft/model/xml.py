@@ -23,22 +23,31 @@ class Element:
     """An XML element with attributes and children, which are written in the order of their calls.
 
     The value of an attribute is a string, a number or several numbers; None omits the attribute.
-    `class_` is the attribute `class`, which is a keyword of Python.
+    `class_` is the attribute `class`, which is a keyword of Python. Once its text is written, its
+    attributes do not change, so that an element of several designs is written once.
     """
 
-    __slots__ = ("attributes", "children", "tag")
+    __slots__ = ("_start", "attributes", "children", "tag")
 
     def __init__(self, tag: str, **attributes: Attribute) -> None:
         self.tag = tag
         self.attributes: dict[str, Any] = attributes
         self.children: list[Element] = []
+        self._start: list[str] = []  # its name and its attributes as text, once written
 
     def add(self, tag: str, **attributes: Attribute) -> Element:
         """Append a child and return it."""
         child = Element.__new__(Element)  # without a second copy of the attributes
-        child.tag, child.attributes, child.children = tag, attributes, []
+        child.tag, child.attributes, child.children, child._start = tag, attributes, [], []
         self.children.append(child)
         return child
+
+    def alone(self) -> Element:
+        """Return the element without its children; both have the same attributes."""
+        one = Element.__new__(Element)
+        one.tag, one.attributes, one.children = self.tag, self.attributes, []
+        one._start = self._start
+        return one
 
     def text(self) -> str:
         """Return the text of the element with all its children, ending in a newline."""
@@ -84,7 +93,20 @@ class Element:
         pieces.append(f"{indent}</{self.tag}>\n")
 
     def _write(self, lines: list[str], indent: str) -> None:
-        words = [f"{indent}<{self.tag}"]
+        if not self._start:
+            self._start.append(self._written())
+        if not self.children:
+            lines.append(f"{indent}<{self._start[0]}/>")
+            return
+        lines.append(f"{indent}<{self._start[0]}>")
+        inner = indent + "  "
+        for child in self.children:
+            child._write(lines, inner)
+        lines.append(f"{indent}</{self.tag}>")
+
+    def _written(self) -> str:
+        """Text of its name and its attributes."""
+        words = [self.tag]
         for name, value in self.attributes.items():
             kind = type(value)
             if kind is str:
@@ -96,15 +118,7 @@ class Element:
             else:
                 text = _numbers((value,)) if kind is float else _formatted(value)
             words.append(f'{name}="{text}"' if name != "class_" else f'class="{text}"')
-        head = " ".join(words)
-        if not self.children:
-            lines.append(head + "/>")
-            return
-        lines.append(head + ">")
-        inner = indent + "  "
-        for child in self.children:
-            child._write(lines, inner)
-        lines.append(f"{indent}</{self.tag}>")
+        return " ".join(words)
 
 
 def parse(text: str) -> Element:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass
 from itertools import chain
 from typing import TYPE_CHECKING, get_args
 
@@ -177,13 +176,13 @@ def _name_problems(spec: Spec) -> Iterator[Problem]:
         [b.placement for b in spec.bodies],
     )
     for part in parts:
-        for expression in _expressions(part, seen):
+        for expression in expressions(part, seen):
             problem = expression_problem(spec, expression)
             if problem:
                 yield problem
 
 
-def _expressions(value: object, seen: set[int]) -> Iterator[Expression]:
+def expressions(value: object, seen: set[int]) -> Iterator[Expression]:
     """Every expression inside a value, each object once."""
     if isinstance(value, Expression):
         yield value
@@ -191,15 +190,15 @@ def _expressions(value: object, seen: set[int]) -> Iterator[Expression]:
         return
     elif id(value) not in seen:
         seen.add(id(value))
-        if is_dataclass(value):
-            for item in fields(value):
-                yield from _expressions(getattr(value, item.name), seen)
+        if (fields := getattr(value, "__dataclass_fields__", None)) is not None:
+            for name in fields:
+                yield from expressions(getattr(value, name), seen)
         elif isinstance(value, Mapping):
             for item in value.values():
-                yield from _expressions(item, seen)
+                yield from expressions(item, seen)
         elif isinstance(value, (tuple, list)):
             for item in value:
-                yield from _expressions(item, seen)
+                yield from expressions(item, seen)
 
 
 def _duplicate_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:

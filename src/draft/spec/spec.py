@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from draft.errors import Location, counted
 from draft.files import Readable
+from draft.lazy import verb
 from draft.spec.expressions import Expression
 from draft.spec.primitives.root import WrittenRoot
 from draft.spec.tree import Body
@@ -144,6 +145,7 @@ class Spec:
         }
         return f"Spec('{self.name}', {', '.join(counted(n, what) for what, n in counts.items())})"
 
+    @verb
     def resolve(
         self,
         values: Mapping[str, Value | str | None] | str | Path | None = None,
@@ -167,7 +169,6 @@ class Spec:
                 value.
             SpecError: the design file cannot be read.
         """
-        # `resolve` and `Design.build` are the only calls to a package above their own.
         from draft.design import resolve
         from draft.spec.load import read_design
         from draft.spec.payload import with_payload

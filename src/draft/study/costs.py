@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-from draft.errors import counted
+from draft.errors import DraftError, counted
 from draft.learn.engine.machine import KINDS, NATIVE, minutes
 from draft.learn.measuring.levels import skill_tests
 from draft.learn.training.progress import PROGRESS
@@ -125,7 +126,14 @@ def estimate(store: Store, rate: float | None, capacity: Capacity | None) -> Est
         store: folder of the study.
         rate: steps per second of a job; None to measure or assume them.
         capacity: what would run the jobs; None for GPUs that are not here.
+
+    Raises:
+        DraftError: the rate is not above 0 and finite.
     """
+    if rate is not None and not 0 < rate < math.inf:
+        raise DraftError(
+            f"`rate` {rate} is not above 0 and finite", "omit it to measure or assume it"
+        )
     rates = Rates(store.folder, store.jobs, rate, capacity)
     changed = store.changed()
     left = {

@@ -63,12 +63,6 @@ def _option(name: str) -> BeforeValidator:
     return BeforeValidator(check)
 
 
-def _yes_no(value: object) -> bool:
-    if type(value) is not bool:
-        raise PydanticCustomError("yes_no", "expected true or false")
-    return value
-
-
 def _unique(values: list[_T]) -> list[_T]:
     for value in values:
         if values.count(value) > 1:
@@ -96,7 +90,6 @@ def _kind(one: str, other: str, kind: type) -> Discriminator:
 
 Seed = Annotated[int, _option("seed")]
 Iterations = Annotated[int, _option("iterations")]
-Switch = Annotated[bool, BeforeValidator(_yes_no)]
 Word = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 # Part of file names and of the names of jobs.
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.]*$", max_length=64)]
@@ -124,7 +117,7 @@ class Family(Model):
     """Number of bodies that are drawn."""
     seed: Seed = 0
     """Seed of the draws; all seeds of the study train the same bodies."""
-    see_design: Switch = True
+    see_design: Annotated[bool, _option("see_design")] = True
     """Whether the policy observes the numbers that distinguish the bodies."""
     name: Label | None = None
     """Name of the family; DESIGN-N-bodies by default."""
@@ -188,7 +181,7 @@ class StudyFile(Model):
     """Content of a study's file; the keys of `trainings` stand beside the others."""
 
     designs: Annotated[list[Design], Field(min_length=1)]
-    """Designs as 'draft train' takes them, and families."""
+    """Designs as `draft.train` takes them, and families."""
     seeds: Seeds = 10
     """Number of seeds, or a list of them."""
     stages: Annotated[list[StageName], Field(min_length=1), BeforeValidator(_stages)] = Field(

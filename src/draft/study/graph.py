@@ -17,7 +17,15 @@ from draft.learn.measuring.summary import ARMS, FORMAT, PROTOCOLS
 from draft.learn.task.stages import STAGES
 from draft.learn.training import run as runs
 from draft.study.file import Study
-from draft.study.jobs import REPORT, Evaluating, Group, Job, Reporting, Training
+from draft.study.jobs import (
+    REPORT,
+    Evaluating,
+    Group,
+    Job,
+    Reporting,
+    Training,
+    evaluation_job,
+)
 
 
 def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
@@ -85,7 +93,7 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
                     include={*Extras.model_fields, "errors"}, exclude_defaults=True
                 ),
             }
-            name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
+            name = evaluation_job(training.name, arm, protocol)
             key, needs = _hash(determinants), (training.name,)
             found.append(Evaluating(name, key, needs, training, options))
     return found

@@ -14,7 +14,7 @@ from draft.learn.engine.machine import EngineName
 from draft.learn.measuring import results
 from draft.learn.measuring.evaluation_options import Options
 from draft.learn.measuring.levels import skill_tests
-from draft.learn.measuring.summary import ARMS, Arm
+from draft.learn.measuring.summary import ARMS, Arm, Protocol
 from draft.learn.measuring.summary import Request as Asked
 from draft.learn.training import run as runs
 from draft.learn.training.session import SCRATCH, begin
@@ -187,13 +187,15 @@ class Training(Job):
         run = runs.Run(self.output(folder), self.plan)
         # A run that was started keeps the number of processes of its state.
         replicas = physics.replicas if run.processes() is None else None
-        return TrainRequest(
-            run=str(run.folder),
-            iterations=self.iterations,
-            minutes=minutes,
-            device=device,
-            engine=physics.engine,
-            replicas=replicas,
+        return TrainRequest.of(
+            {
+                "run": str(run.folder),
+                "iterations": self.iterations,
+                "minutes": minutes,
+                "device": device,
+                "engine": physics.engine,
+                "replicas": replicas,
+            }
         )
 
     def record(self) -> dict[str, object]:
@@ -293,6 +295,11 @@ class Reporting(Job):
     ) -> ReportRequest:
         """See `Job`."""
         return ReportRequest(study=str(folder))
+
+
+def evaluation_job(run: str, arm: Arm, protocol: Protocol) -> str:
+    """Return the name of the job of an evaluation."""
+    return f"{run}-{arm}" + "-published" * (protocol == "published")
 
 
 def _stamp(*paths: Path) -> _Stamp:

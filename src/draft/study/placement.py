@@ -3,53 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from draft.errors import DraftError
 from draft.explore.engines import RayEngine
 from draft.extras import need
-from draft.learn.engine.machine import EngineName, devices, this_machine, visible
+from draft.learn.engine.machine import devices, this_machine, visible
 from draft.study.capacity import Capacity, on_cpu, on_gpus
 from draft.study.file import Study
+from draft.study.options import Placement
 from draft.study.workers import LocalWorker, RayWorker, Worker
-
-MOST_WORKERS = 1024
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Devices of the jobs of a study, and the number of jobs at once.
-
-    Attributes:
-        device: "auto" (all GPUs, or the CPU), "cpu", "cuda:1", or numbers of GPUs such as "0,1".
-        workers: number of jobs at once; None for one per GPU, and on a CPU for one that uses all
-            cores.
-        engine: "auto", "native" or "warp".
-        replicas: processes of each training on a CPU; None for one per physical core, shared by
-            the jobs at once.
-        ray: whether jobs run on a Ray cluster that shares the study's folder.
-        address: HOST:PORT of the cluster; None for this machine's.
-    """
-
-    device: str = "auto"
-    workers: int | None = None
-    engine: EngineName = "auto"
-    replicas: int | None = None
-    ray: bool = False
-    address: str | None = None
-
-    def check(self) -> None:
-        """Check the options that need no device.
-
-        Raises:
-            DraftError: a number is out of range, or an option lacks another one.
-        """
-        if self.workers is not None and not 1 <= self.workers <= MOST_WORKERS:
-            cause = f"`workers` {self.workers} is not from 1 to {MOST_WORKERS}"
-            raise DraftError(cause, "such as 2")
-        if self.address is not None and not self.ray:
-            cause = "`address` is for a Ray cluster"
-            raise DraftError(cause, "add `ray`, or omit `address`")
 
 
 def expected_capacity(study: Study, placement: Placement) -> Capacity | None:

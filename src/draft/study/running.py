@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ParamSpec, Protocol
 
 from draft.errors import DraftError
-from draft.learn.engine.machine import EngineName
+from draft.settings import by_keyword
 from draft.study.designs import read_groups
 from draft.study.execution import Execution, Watch
 from draft.study.file import Study, read
 from draft.study.graph import graph
 from draft.study.jobs import REPORT
-from draft.study.placement import Placement, make_workers
+from draft.study.options import RunOptions
+from draft.study.placement import make_workers
 from draft.study.store import Store
 
-_MOST_MINUTES = 10**6
+P = ParamSpec("P")
 
 
 @dataclass(frozen=True)
@@ -67,19 +69,34 @@ def open_study(
     return Store(folder, study, groups, graph(study, groups))
 
 
+class _RunStudy(Protocol[P]):
+    """Type of `run_study`, with the options of the record as keyword arguments."""
+
+    def __call__(
+        self,
+        study: str | Path | Study,
+        out: str | Path | None = None,
+        toy: bool = False,
+        watch: Watch | None = None,
+        *args: P.args,
+        **options: P.kwargs,
+    ) -> Outcome: ...
+
+
+def _with_options(
+    record: Callable[P, RunOptions],
+) -> Callable[[Callable[..., Outcome]], _RunStudy[P]]:
+    return by_keyword(record)
+
+
+@_with_options(RunOptions)
 def run_study(
     study: str | Path | Study,
     out: str | Path | None = None,
     *,
     toy: bool = False,
-    minutes: float | None = None,
-    device: str = "auto",
-    workers: int | None = None,
-    engine: EngineName = "auto",
-    replicas: int | None = None,
-    ray: bool = False,
-    address: str | None = None,
     watch: Watch | None = None,
+    options: RunOptions,
 ) -> Outcome:
     """Train and evaluate all designs of a study with all seeds, and write its report.
 
@@ -95,29 +112,18 @@ def run_study(
         study: a study's file, or a study that `draft.study.read_study` read.
         out: folder of the study; None for `studies/NAME`, or `studies/NAME-toy` of a toy.
         toy: whether to replace numbers of the file by those under `toy`: everything, but tiny.
-        minutes: time limit, from the start of the call [min]; None for no limit.
-        device: "auto" (all GPUs, or the CPU), "cpu", "cuda:1", or numbers of GPUs such as "0,1".
-        workers: number of jobs at once; None for one per GPU, and on a CPU for one that uses all
-            cores.
-        engine: "auto", "native" or "warp".
-        replicas: processes of each training on a CPU; None for one per physical core, shared by
-            the jobs at once.
-        ray: whether to run jobs on a Ray cluster that shares the folder.
-        address: HOST:PORT of the cluster; None for this machine's.
         watch: observer of the progress.
+        options: fields of `RunOptions`, by keyword.
 
     Raises:
         DraftError: the study cannot be read, an option does not fit this machine, another process
             has the folder, or it cannot be written.
     """
     start, watch = time.monotonic(), watch or Watch()
-    placement = Placement(device, workers, engine, replicas, ray, address)
-    placement.check()
-    check_number("minutes", minutes, _MOST_MINUTES)
     store = open_study(study, out, toy)
     # A study that is finished needs no worker, and so no PyTorch.
-    team = [] if store.finished() else make_workers(store.study, placement)
-    until = math.inf if minutes is None else start + 60.0 * minutes
+    team = [] if store.finished() else make_workers(store.study, options)
+    until = math.inf if options.minutes is None else start + 60.0 * options.minutes
     try:
         store.open()
         watch.opened(store)
@@ -132,17 +138,6 @@ def run_study(
         done=done,
         jobs=store.states,
         failures=execution.failures,
-        minutes_needed=math.ceil((minutes or 0.0) + short / 60.0) if short else None,
+        minutes_needed=math.ceil((options.minutes or 0.0) + short / 60.0) if short else None,
         report=page if page.is_file() else None,
     )
-
-
-def check_number(name: str, value: float | None, most: float) -> None:
-    """Check that an option is above 0 and at most a limit; None is allowed.
-
-    Raises:
-        DraftError: it is not, or it is NaN.
-    """
-    if value is not None and not 0 < value <= most:
-        cause = f"`{name}` {value} is not above 0 and at most {most:g}"
-        raise DraftError(cause, "omit it for the default")

@@ -121,7 +121,7 @@ class Store:
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            self._lock = lock(self.folder, "draft study")
+            self._lock = lock(self.folder, "run of the study")
             self._read()
             self._put_aside()
             self._restore()

@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -250,9 +250,15 @@ def resolve_without(choice: DesignChoice, without: Collection[str]) -> Design:
     # With a file of its own, the spec is held out of the shipped survey all the same.
     of = choice.spec.population
     laws = population(of, own) if isinstance(own, str) else read_population(of, own)
-    table = {USES: laws.uses, **structure_trends(without=without)}
+    table = {USES: laws.uses, **_trends_without(frozenset(without), of)}
     file = Content(f"without_{len(without)}.json", json.dumps(table).encode())
     return replace(choice, spec=replace(choice.spec, structure=file)).resolve()
+
+
+@lru_cache(maxsize=4)
+def _trends_without(without: frozenset[str], population: str) -> dict[str, Any]:
+    """Structure trends of a population without some robots; a twin with other knees asks again."""
+    return structure_trends(without=without, of=(population,))
 
 
 def _shared(files: Files, spec: Spec, path: Path) -> tuple[dict[str, str], tuple[str, ...]]:

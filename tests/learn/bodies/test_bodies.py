@@ -17,6 +17,7 @@ from draft.learn.bodies.designs import family, joined, open_bodies
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.bodies.legged_batch import legged_robots
 from draft.model.folder import design_text, design_texts
+from tests.learn.small import member
 
 VARY = ("thigh_length=0.2:0.4", "actuators.leg.peak_torque=40:200:log")
 
@@ -30,14 +31,11 @@ def test_designs_are_taken_as_they_are_named() -> None:
     assert names == ["quadruped:cheetah-1", "quadruped:bear", "quadruped:cheetah-2"]
     assert first.xml == third.xml != second.xml
     assert bodies.note == ""
-
-
-def test_a_single_design_keeps_its_name_and_values_win() -> None:
-    bodies = open_bodies(["cheetah"], values={"thigh_length": 0.27})
-    assert bodies.members[0].leg_length == pytest.approx(0.27 + 0.23)
-    assert bodies.members[0].peak_torque == pytest.approx([72] * 12)
-    (plain,) = open_bodies(["cheetah"]).members
-    assert plain.name == "quadruped:cheetah"
+    # A single design keeps its name, and values win.
+    (alone,) = open_bodies(["cheetah"], values={"thigh_length": 0.27}).members
+    assert alone.leg_length == pytest.approx(0.27 + 0.23)
+    assert alone.peak_torque == pytest.approx([72] * 12)
+    assert member().name == open_bodies(["cheetah"]).members[0].name == "quadruped:cheetah"
 
 
 def test_bodies_are_drawn_until_enough_pass() -> None:
@@ -45,12 +43,12 @@ def test_bodies_are_drawn_until_enough_pass() -> None:
     bodies = open_bodies(["cheetah"], VARY, 12, seed=3)
     found = bodies.members
     assert len(bodies.texts) == len(found) == len({member.name for member in found}) == 12
-    for text, member in zip(bodies.texts, found, strict=True):
+    for text, one in zip(bodies.texts, found, strict=True):
         design = bodies.spec.resolve(yaml.safe_load(text)["values"])
         assert design.accepted
-        assert design.build().xml == member.xml
-        assert 0.43 <= member.leg_length <= 0.63
-        assert 40 <= member.peak_torque[0] <= 200
+        assert design.build().xml == one.xml
+        assert 0.43 <= one.leg_length <= 0.63
+        assert 40 <= one.peak_torque[0] <= 200
         # What is not varied is that of the named design.
         assert design.parameters["trunk_length"] == pytest.approx(0.52)
     assert len({member.leg_length for member in found}) == 12
@@ -125,15 +123,11 @@ def test_every_refused_design_of_a_family_is_reported_up_to_five() -> None:
     assert said[5:] == ["and 2 more of 8 designs"]
 
 
-def test_a_family_has_a_design() -> None:
+def test_a_family_has_a_design_and_numbered_names_avoid_those_that_are_taken() -> None:
     with pytest.raises(DraftError, match="a family needs a design"):
         joined([])
-
-
-def test_numbered_names_avoid_those_that_are_taken() -> None:
-    (member,) = open_bodies(["cheetah"]).members
-    other = replace(member, name="quadruped:cheetah-1")
-    names = [one.name for one in joined([member, other, member])]
+    other = replace(member(), name="quadruped:cheetah-1")
+    names = [one.name for one in joined([member(), other, member()])]
     assert names == ["quadruped:cheetah-2", "quadruped:cheetah-1", "quadruped:cheetah-3"]
 
 
@@ -145,10 +139,10 @@ def test_many_quadrupeds_are_those_that_are_read_alone() -> None:
     rows = np.flatnonzero(design.accepted)[:12]
     found = legged_robots(design, rows)
     assert list(found) == rows.tolist()
-    for row, member in found.items():
-        assert isinstance(member, LeggedRobot)
+    for row, one in found.items():
+        assert isinstance(one, LeggedRobot)
         alone = legged_robot(design[row]).as_dict()
-        for name, value in member.as_dict().items():
+        for name, value in one.as_dict().items():
             if name in ("home", "height", "top_speed", "mass", "leg_length", "foot_radius"):
                 assert value == pytest.approx(alone[name], rel=1e-12)
             else:
@@ -178,16 +172,19 @@ def test_numbers_of_design_files_are_written_as_yaml_writes_them() -> None:
         assert line in text.splitlines()
 
 
-def test_designs_that_are_refused_are_read_alone_for_their_reason() -> None:
-    design = draft.load("quadruped").resolve({"actuators.leg.peak_torque": np.array([3e3, 72.0])})
-    first, second = legged_robots(design, np.arange(2)).values()
+def test_designs_that_are_not_like_the_first_or_refused_are_read_alone() -> None:
+    torques = np.array([3e3, 72.0])
+    refused, design = (
+        draft.load("quadruped").resolve(values)
+        for values in (
+            {"actuators.leg.peak_torque": torques},
+            {"thigh_length": np.array([0.25, 0.26, 0.24])},
+        )
+    )
+    first, second = legged_robots(refused, np.arange(2)).values()
     assert isinstance(first, DraftError)
     assert "torque" in str(first)
     assert isinstance(second, LeggedRobot)
-
-
-def test_designs_that_are_not_like_the_first_are_read_alone() -> None:
-    design = draft.load("quadruped").resolve({"thigh_length": np.array([0.25, 0.26, 0.24])})
     found = legged_robots(design, np.arange(3))
     with mock.patch.object(many, "_alike", return_value=np.array([True, False, True])):
         others = legged_robots(design, np.arange(3))

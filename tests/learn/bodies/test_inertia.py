@@ -42,12 +42,6 @@ class Bodies:
         self.centre = model.body_ipos[1:] + change.shift
 
 
-def rotation(quat: Any) -> Any:
-    found = np.zeros(9)
-    mujoco.mju_quat2Mat(found, quat)
-    return found.reshape(3, 3)
-
-
 def pseudo(mass: Any, centre: Any, moments: Any, axes: Any) -> Any:
     """Pseudo-inertia from mass, centre of mass and principal moments with their axes."""
     second = np.einsum(
@@ -116,19 +110,11 @@ def test_the_survey_widens_the_ranges_to_all_surveyed_quadrupeds_and_no_humanoid
     assert all(found[group].mass[1] > twins[group].mass[1] for group in GROUPS)
 
 
-def test_the_published_ranges_are_those_of_the_released_code() -> None:
-    found = inertia.extents("paper")
-    assert found == PAPER
-    assert found["trunk"].mass == (1.007, 1.360)
-    assert found["shank"].up == (-0.0095, 0.0278)
-
-
-def test_an_unknown_source_is_refused_with_those_there_are() -> None:
-    with pytest.raises(DraftError, match="no inertia errors called 'twin'") as caught:
+def test_the_published_ranges_are_those_of_the_released_code_and_others_are_unknown() -> None:
+    assert (PAPER["trunk"].mass, PAPER["shank"].up) == ((1.007, 1.360), (-0.0095, 0.0278))
+    assert inertia.extents("paper") == PAPER
+    with pytest.raises(DraftError, match=r"no inertia errors called 'twin'\n.*twins.*paper"):
         inertia.extents("twin")
-    remedy = caught.value.problems[0].remedy or ""
-    assert "twins" in remedy
-    assert "paper" in remedy
 
 
 @pytest.mark.parametrize("source", inertia.SOURCES)
@@ -235,37 +221,6 @@ def check_wholes(model: Any, links: Links) -> None:
         np.testing.assert_allclose(centre - before[root][1], shift, rtol=0, atol=1e-9)
 
 
-def test_the_total_mass_changes_by_the_drawn_ratios(design: tuple[Any, Links]) -> None:
-    model, links = design
-    draws = drawn(count=50)
-    found = Bodies(model, inertia.change(links, first(50), draws)).mass.sum(axis=1)
-    nominal = np.bincount(links.group, model.body_mass[1:], len(GROUPS))
-    np.testing.assert_allclose(found, draws.mass @ nominal, rtol=1e-12)
-    assert np.ptp(found) > 0.1 * nominal.sum()
-
-
-def test_legs_on_the_right_mirror_those_on_the_left(design: tuple[Any, Links]) -> None:
-    model, links = design
-    found = Bodies(model, inertia.change(links, first(100), drawn(count=100)))
-    index = {name: i for i, name in enumerate(links.names)}
-    mirror = np.array([1.0, -1.0, 1.0])
-    pairs = [(i, index[name.replace("L_", "R_", 1)]) for name, i in index.items() if "L_" in name]
-    moving = [(i, j) for i, j in pairs if links.group[i] > 0]
-    assert len(moving) == 8
-    for i, j in moving:
-        np.testing.assert_allclose(found.mass[:, i], found.mass[:, j], rtol=1e-12)
-        np.testing.assert_allclose(found.moments[:, i], found.moments[:, j], rtol=1e-9)
-        np.testing.assert_allclose(found.centre[:, i], found.centre[:, j] * mirror, atol=1e-9)
-    shifted = [i for i, _ in moving if np.ptp(found.centre[:, i, 1]) > 1e-3]
-    assert len(shifted) == 8
-
-
-def test_every_body_stays_physical_for_ten_thousand_draws(design: tuple[Any, Links]) -> None:
-    model, links = design
-    found = Bodies(model, inertia.change(links, first(DRAWS), drawn()))
-    check_physical(found.mass, found.moments, found.centre, axes_of(model))
-
-
 @settings(max_examples=50)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_random_bodies_stay_physical_and_follow_the_pseudo_inertia(seed: int) -> None:
@@ -303,10 +258,6 @@ def test_random_bodies_stay_physical_and_follow_the_pseudo_inertia(seed: int) ->
     check_physical(new[0], new[2], new[1], axes)
 
 
-def axes_of(model: Any) -> Any:
-    return np.stack([rotation(quat) for quat in model.body_iquat[1:]])
-
-
 def check_physical(mass: Any, moments: Any, centre: Any, axes: Any) -> None:
     """Masses positive, triangle inequalities, pseudo-inertia positive semidefinite."""
     assert (mass > 0).all()
@@ -317,9 +268,7 @@ def check_physical(mass: Any, moments: Any, centre: Any, axes: Any) -> None:
     own = pseudo(mass, np.zeros_like(centre), moments, axes)
     least, most = np.linalg.eigvalsh(own[..., :3, :3])[..., [0, -1]].T
     assert (least >= -1e-12 * most).all()
-    step = max(1, len(mass) // 500)
-    full = pseudo(mass, centre, moments, axes)[::step]
-    values = np.linalg.eigvalsh(full)
+    values = np.linalg.eigvalsh(pseudo(mass, centre, moments, axes))
     assert (values[..., 0] >= -1e-12 * values[..., -1]).all()
 
 
@@ -336,8 +285,7 @@ def test_each_individual_is_of_its_own_design() -> None:
 
 
 def test_designs_with_other_bodies_are_refused() -> None:
-    odd = replace(
-        member(), name="odd", text=Text(member().xml.replace("FL_hip_housing", "FL_other"))
-    )
+    text = Text(member().xml.replace("FL_hip_housing", "FL_other"))
+    odd = replace(member(), name="odd", text=text)
     with pytest.raises(DraftError, match="odd has other bodies than"):
         inertia.links([member(), odd])

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 import draft
-from draft.design.references import open_designs
 from draft.errors import DraftError, RefusedError
 from draft.learn.bodies.legged import CLASSES, LeggedRobot, check_family, legged_robot
+from tests.learn.small import member
 
 SHIPPED = Path(draft.__file__).parent / "robots" / "quadruped"
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[3].parent / "shared"))
@@ -38,11 +38,6 @@ NUMBERS = {
 }
 
 
-def shipped(name: str) -> LeggedRobot:
-    (design,) = open_designs([name])
-    return legged_robot(design)
-
-
 def changed(folder: Path, *edits: tuple[str, str]) -> draft.Design:
     """The shipped quadruped with its tree changed."""
     shutil.copytree(SHIPPED, folder)
@@ -57,7 +52,7 @@ def changed(folder: Path, *edits: tuple[str, str]) -> draft.Design:
 
 @pytest.mark.parametrize("name", NUMBERS)
 def test_numbers_of_the_shipped_designs(name: str) -> None:
-    found = shipped(name)
+    found = member(name)
     leg, scale, torque, speed, top = NUMBERS[name]
     assert found.name == f"quadruped:{name}"
     assert found.leg_length == pytest.approx(leg)
@@ -76,48 +71,41 @@ def test_numbers_of_the_shipped_designs(name: str) -> None:
     ]
     assert found.leg_mirror == (1, 0, 3, 2)
     assert found.mirror == (3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8)
+    assert found.mirror_sign == (-1.0, 1.0, 1.0) * 4
     # Near the crouch's 0.878 L and the foot's radius (study, section 5).
     assert found.height == pytest.approx(0.878 * leg + found.foot_radius, abs=1e-3 * leg)
 
 
 def test_it_goes_through_json() -> None:
-    found = shipped("bear")
+    found = member("bear")
     assert LeggedRobot.from_dict(json.loads(json.dumps(found.as_dict()))) == found
     with pytest.raises(KeyError):
         LeggedRobot.from_dict({"name": "bear"})
 
 
-def mirrored_feet(found: LeggedRobot, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Feet of a random pose mirrored in y, and feet of the mirrored pose, leg for leg."""
+def assert_mirrored(found: LeggedRobot, seed: int, tolerance: float = 1e-9) -> None:
+    """Check that a random pose mirrored in y has the mirrored feet, and anchors of joints."""
     model = mujoco.MjModel.from_xml_string(found.xml)
     data, rng = mujoco.MjData(model), np.random.default_rng(seed)
     low, high = np.array(found.ranges).T
-    pose = rng.uniform(low, high)
-    other = np.empty(len(pose))
-    for i, j in enumerate(found.mirror):
-        other[j] = found.mirror_sign[i] * pose[i]
-    feet = []
+    pose, mirror = rng.uniform(low, high), list(found.mirror)
+    other = (np.array(found.mirror_sign) * pose)[mirror]
+    ids = [model.joint(name).id for name in found.joints]
+    feet, anchors = [], []
     for angles in (pose, other):
         data.qpos[:7], data.qpos[7:] = (0, 0, 0, 1, 0, 0, 0), angles
         mujoco.mj_kinematics(model, data)
         feet.append(np.array([data.site(name).xpos for name in found.feet]))
-    return feet[0] * (1, -1, 1), feet[1][list(found.leg_mirror)]
+        anchors.append(data.xanchor[ids].copy())
+    sides = list(found.leg_mirror)
+    np.testing.assert_allclose(feet[1][sides], feet[0] * (1, -1, 1), atol=tolerance)
+    np.testing.assert_allclose(anchors[1][mirror], anchors[0] * (1, -1, 1), atol=tolerance)
 
 
 @pytest.mark.parametrize("name", NUMBERS)
 @pytest.mark.parametrize("seed", range(5))
 def test_a_mirrored_pose_has_mirrored_feet(name: str, seed: int) -> None:
-    expected, found = mirrored_feet(shipped(name), seed)
-    np.testing.assert_allclose(found, expected, atol=1e-9)
-
-
-def test_mirroring_twice_gives_the_same_pose() -> None:
-    found = shipped("cheetah")
-    for i, j in enumerate(found.mirror):
-        assert found.mirror[j] == i
-        assert found.mirror_sign[j] == found.mirror_sign[i]
-        assert i != j
-    assert found.mirror_sign == (-1.0, 1.0, 1.0) * 4
+    assert_mirrored(member(name), seed)
 
 
 @pytest.mark.skipif(not ROBOTS.is_dir(), reason="the robots are not beside this folder")
@@ -127,9 +115,7 @@ def test_real_quadrupeds_come_through_the_import(name: str, tmp_path: Path) -> N
     from draft.imports.importer import import_robot
 
     found = legged_robot(import_robot(ROBOTS / REAL[name], tmp_path / name).spec.resolve())
-    expected, feet = mirrored_feet(found, 0)
-    # Makers round their descriptions of the two sides.
-    np.testing.assert_allclose(feet, expected, atol=2e-3)
+    assert_mirrored(found, 0, 2e-3)  # Makers round their descriptions of the two sides.
     assert sorted(i for leg in found.leg_joints for i in leg) == list(range(12))
     assert all(len(leg) > 0 for leg in found.upper_legs)
     assert 0.4 * found.leg_length < found.height < found.leg_length + 2 * found.foot_radius
@@ -160,21 +146,24 @@ MIDDLE = "".join(
     f"    - {{chain: leg, prefix: {side}, at: [0, hip_spacing / 2, 0]{mirror}}}\n"
     for side, mirror in (("ML_", ""), ("MR_", ", mirror: y"))
 )
-ARM = """  arm:
+
+
+def arm(axis: str = "y", at: str = "") -> tuple[tuple[str, str], ...]:
+    """Edits that hang a one-jointed arm from the trunk."""
+    chain = f"""
+  arm:
     - name: shoulder_motor
-      motor: {actuator: leg, axis: y}
+      motor: {{actuator: leg, axis: y}}
     - name: upper_arm
-      joint: {name: shoulder, axis: AXIS, range: [-1, 1], actuator: leg}
-      link: {axis: z, length: 0.2, segment: thigh}
+      joint: {{name: shoulder, axis: {axis}, range: [-1, 1], actuator: leg}}
+      link: {{axis: z, length: 0.2, segment: thigh}}
 
 tree:"""
+    return ("\ntree:", chain), (LEG, f"    - {{chain: arm{at}}}\n{LEG}")
 
 
-FREE = (
-    ARM.replace("    - name: shoulder_motor\n      motor: {actuator: leg, axis: y}\n", "")
-    .replace("AXIS", "y")
-    .replace(", actuator: leg}", "}")
-)
+MOTOR = "    - name: shoulder_motor\n      motor: {actuator: leg, axis: y}\n"
+NO_MOTOR = (MOTOR, ""), ("range: [-1, 1], actuator: leg}", "range: [-1, 1]}")
 
 
 def walker(name: str, folder: Path) -> LeggedRobot:
@@ -183,12 +172,9 @@ def walker(name: str, folder: Path) -> LeggedRobot:
         "hexapod": ((LEG, MIDDLE + LEG),),
         "yaw": ((ROLL, "name: hip_roll, axis: z"),),
         "plates": ((SPHERE, PLATE),),
-        "arm": (
-            ("\ntree:", "\n" + ARM.replace("AXIS", "y")),
-            (LEG, f"    - {{chain: arm}}\n{LEG}"),
-        ),
+        "arm": arm(),
     }
-    return shipped(name) if name not in edits else legged_robot(changed(folder, *edits[name]))
+    return member(name) if name not in edits else legged_robot(changed(folder, *edits[name]))
 
 
 @pytest.mark.parametrize(
@@ -219,24 +205,7 @@ def test_other_legged_robots_are_found_by_their_structure(
     assert found.classes == classes
     names = [joint.replace("_", " ") for joint in found.joints]
     assert all(n.endswith(classes[k]) for n, k in zip(names, found.joint_classes, strict=True))
-    expected, feet = mirrored_feet(found, 3)
-    np.testing.assert_allclose(feet, expected, atol=1e-9)
-    expected, anchors = mirrored_anchors(found, 4)
-    np.testing.assert_allclose(anchors, expected, atol=1e-9)
-
-
-def mirrored_anchors(found: LeggedRobot, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Anchors of all joints in a random pose mirrored in y, and those of the mirrored pose."""
-    model = mujoco.MjModel.from_xml_string(found.xml)
-    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
-    low, high = np.array(found.ranges).T
-    pose = rng.uniform(low, high)
-    anchors = []
-    for angles in (pose, np.array(found.mirror_sign) * pose[list(found.mirror)]):
-        data.qpos[:7], data.qpos[7:] = (0, 0, 0, 1, 0, 0, 0), angles
-        mujoco.mj_kinematics(model, data)
-        anchors.append(data.xanchor[[model.joint(name).id for name in found.joints]].copy())
-    return anchors[0] * (1, -1, 1), anchors[1][list(found.mirror)]
+    assert_mirrored(found, 3)
 
 
 def test_feet_touch_the_ground_in_the_home_pose(tmp_path: Path) -> None:
@@ -263,37 +232,22 @@ def test_feet_touch_the_ground_in_the_home_pose(tmp_path: Path) -> None:
     ("edits", "cause"),
     [
         (((RIGHT_REAR, ""),), "its legs are not pairs of a left and a right one"),
-        (
-            (
-                ("\ntree:", "\n" + ARM.replace("AXIS", "y")),
-                (LEG, f"    - {{chain: arm, at: [0, 0.1, 0]}}\n{LEG}"),
-            ),
-            "its joint shoulder has no counterpart on the other side",
-        ),
-        (
-            (
-                ("\ntree:", "\n" + FREE),
-                (LEG, f"    - {{chain: arm}}\n{LEG}"),
-            ),
-            "its joint shoulder has no actuator",
-        ),
+        (arm(at=", at: [0, 0.1, 0]"), "its joint shoulder has no counterpart on the other side"),
+        ((*arm(), *NO_MOTOR), "its joint shoulder has no actuator"),
     ],
-    ids=["three_legs", "arm_on_one_side", "passive_joint"],
+    ids=["three legs", "an arm on one side", "a passive joint"],
 )
 def test_robots_that_cannot_be_trained_are_refused_with_the_cause(
     tmp_path: Path, edits: tuple[tuple[str, str], ...], cause: str
 ) -> None:
     with pytest.raises(DraftError) as caught:
         legged_robot(changed(tmp_path / "robot", *edits))
-    assert f"cannot be trained: {cause}" in str(caught.value)
-    assert str(caught.value).endswith(ONLY)
+    assert str(caught.value) == f"quadruped cannot be trained: {cause}\n  {ONLY}"
 
 
 def test_without_a_home_pose_legs_crouch_and_other_joints_stay_at_zero(tmp_path: Path) -> None:
-    arm = ("\ntree:", "\n" + ARM.replace("AXIS", "y"))
     bare = ((", home: crouch / 2", ""), (", home: -crouch", ""))
-    with_arm = (arm, (LEG, f"    - {{chain: arm}}\n{LEG}"))
-    found = legged_robot(changed(tmp_path / "robot", *bare, *with_arm))
+    found = legged_robot(changed(tmp_path / "robot", *bare, *arm()))
     home = dict(zip(found.joints, found.home, strict=True))
     assert home["shoulder"] == 0.0
     assert home["FL_knee"] < -0.5
@@ -301,27 +255,21 @@ def test_without_a_home_pose_legs_crouch_and_other_joints_stay_at_zero(tmp_path:
 
 @pytest.mark.parametrize(("axis", "sign"), [("x", -1.0), ("y", 1.0), ("z", -1.0)])
 def test_a_joint_in_the_middle_mirrors_to_itself(axis: str, sign: float, tmp_path: Path) -> None:
-    arm = ("\ntree:", "\n" + ARM.replace("AXIS", axis))
-    found = legged_robot(changed(tmp_path / "robot", arm, (LEG, f"    - {{chain: arm}}\n{LEG}")))
+    found = legged_robot(changed(tmp_path / "robot", *arm(axis)))
     shoulder = found.joints.index("shoulder")
     assert (found.mirror[shoulder], found.mirror_sign[shoulder]) == (shoulder, sign)
 
 
-def test_a_robot_on_one_leg_is_refused() -> None:
+def test_a_robot_on_one_leg_and_a_design_that_the_filter_refuses_are_refused() -> None:
     with pytest.raises(DraftError, match="hopper cannot be trained: it has one leg"):
-        shipped("hopper")
-
-
-def test_a_design_that_the_filter_refuses_is_refused() -> None:
-    design = draft.load("quadruped").resolve({"actuators.leg.peak_torque": 600})
-    assert not design.accepted
+        legged_robot(draft.load("hopper").resolve())
     with pytest.raises(RefusedError):
-        legged_robot(design)
+        legged_robot(draft.load("quadruped").resolve({"actuators.leg.peak_torque": 600}))
 
 
 def test_designs_of_another_topology_are_no_family() -> None:
-    first = shipped("cheetah")
-    check_family([first, shipped("bear"), shipped("giraffe")])
+    first = member("cheetah")
+    check_family([first, member("bear"), member("giraffe")])
     other = replace(first, name="other", feet=("a", "b", "c", "d"))
     with pytest.raises(
         DraftError, match="other has another topology than quadruped:cheetah: its feet"

@@ -8,14 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 
 import draft
 from draft.errors import DraftError
-from draft.learn.bodies.legged import LeggedRobot
-from draft.learn.bodies.payload import with_payload
+from draft.learn.bodies.designs import open_bodies
+from draft.learn.bodies.family_fields import family_fields
+from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.bodies.payload import model_spec, with_payload
 from draft.learn.measuring import evaluation
 from draft.learn.measuring.evaluation_options import Options
 from draft.learn.measuring.levels import skill_tests
@@ -30,7 +31,7 @@ def test_the_block_is_that_of_the_design_with_a_payload(label: str) -> None:
     design = draft.load("quadruped").resolve(label, {"payload": 10})
     expected = design.build().mujoco
     (robot,) = with_payload([member(label)], 10)
-    model = mujoco.MjModel.from_xml_string(robot.xml)
+    model = model_spec(robot).compile()
     assert robot.mass == pytest.approx(float(design.mass))
     names = [expected.body(i).name for i in range(expected.nbody)]
     assert [model.body(i).name for i in range(model.nbody)] == names
@@ -39,17 +40,24 @@ def test_the_block_is_that_of_the_design_with_a_payload(label: str) -> None:
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12, err_msg=field)
 
 
-def test_nothing_else_changes_and_no_mass_is_no_block() -> None:
+def test_nothing_else_changes_and_a_second_payload_has_a_name_of_its_own() -> None:
     (robot,) = with_payload([member()], 10)
-    assert replace(robot, text=Text(""), mass=0.0) == replace(member(), text=Text(""), mass=0.0)
-    assert with_payload([member()], 0) == (member(),)
-
-
-def test_a_second_payload_has_a_name_of_its_own() -> None:
-    ((robot,)) = with_payload(with_payload([member()], 3), 4)
-    model = mujoco.MjModel.from_xml_string(robot.xml)
+    assert replace(robot, block=(), mass=member().mass) == member()
+    trained = legged_robot(draft.load("quadruped").resolve("cheetah", {"payload": 3}))
+    model = model_spec(with_payload([trained], 4)[0]).compile()
     assert model.body("payload").mass[0] == pytest.approx(3)
     assert model.body("payload_").mass[0] == pytest.approx(4)
+
+
+def test_each_body_of_a_family_carries_its_own_block() -> None:
+    drawn = open_bodies(["cheetah"], ["trunk_height=0.15:0.25"], 3, seed=1).members
+    first, fields = family_fields(with_payload(drawn, 10))
+    assert {"geom_pos", "body_ipos"} <= fields.keys()
+    for row, robot in enumerate(with_payload(drawn, 10)):
+        alone = model_spec(robot).compile()
+        for name in ("body_mass", "body_inertia", "body_ipos"):
+            ours = fields[name][row] if name in fields else getattr(first, name)
+            np.testing.assert_array_equal(ours, getattr(alone, name), err_msg=name)
 
 
 @pytest.mark.parametrize("xml", ["<mujoco> </mujoco>", '<mujoco model="x"/>'])

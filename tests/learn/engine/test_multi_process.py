@@ -11,92 +11,25 @@ import socket
 import subprocess
 import sys
 import threading
-import time
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from draft.errors import DraftError, Problem
-from draft.files import lock
-from draft.learn.engine.multi_process import Send, _Server, asked_to_stop, run_processes
+from draft.learn.engine.multi_process import _Server
+from tests.learn.engine.two_processes import ENVIRONMENT, GPUS, ROOT, start
 from tests.waiting import alive, until
 
-# Not by importing it, for it brings PyTorch, and the processes import this module.
+# Not by importing it, for it brings PyTorch.
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("torchrunx") is None, reason="torchrunx is not installed"
 )
-ROOT = Path(__file__).parents[3]
-ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "src"), str(ROOT)])}
-
-
-def fails(folder: Path, rank: int, send: Send) -> bool:
-    """The second process finds something wrong; the first would wait for it for ever."""
-    send({"rank": rank, "gpus": os.environ["CUDA_VISIBLE_DEVICES"]})
-    begun = folder / "begun"
-    if rank == 1:
-        until(begun.exists)
-        raise DraftError(Problem("the second has had enough", None, "give it a rest"))
-    begun.touch()
-    time.sleep(3600)
-    return True
-
-
-def breaks(folder: Path, rank: int, send: Send) -> bool:
-    raise ZeroDivisionError("by nothing\nat all")
-
-
-def lasts(folder: Path, rank: int, send: Send) -> bool:
-    send({"process": os.getpid()})
-    time.sleep(3600)
-    return True
-
-
-def stops(folder: Path, rank: int, send: Send) -> bool:
-    """Work until asked to stop."""
-    send({"rank": rank})
-    until(asked_to_stop)
-    return False
-
-
-GPUS = {"CUDA_VISIBLE_DEVICES": "4,GPU-5"}
-
-
-def main(name: str, folder: str) -> None:
-    """Run a function of this module as `draft train` does, in a folder that it holds."""
-
-    def receive(message: dict[str, Any]) -> None:
-        # In one piece: `print` writes the end of a line apart, and there are two threads.
-        sys.stdout.write(json.dumps(message) + "\n")
-        sys.stdout.flush()
-
-    place = Path(folder)
-    # Whoever runs the tests in the background may have them ignore Ctrl-C.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    with lock(place, "test"):
-        try:
-            run_processes(partial(globals()[name], place), 2, GPUS, place / "logs", receive)
-        except DraftError as error:
-            print(json.dumps({"problem": str(error)}))
-        except KeyboardInterrupt:
-            print(json.dumps({"stopped": True}))
-
-
-def start(name: str, folder: Path) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-c", f"from {__name__} import main; main({name!r}, {str(folder)!r})"],
-        cwd=ROOT,
-        env=ENVIRONMENT,
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
 
 
 def alone(name: str, address: str) -> subprocess.Popen[str]:
     """Start the second process without torchrunx."""
-    code = f"from {__name__} import {name}, partial, Path\nworker = partial({name}, Path())\n"
+    code = f"from {start.__module__} import {name}, partial, Path\n"
+    code += f"worker = partial({name}, Path())\n"
     code += f"from draft.learn.engine.multi_process import _process\n_process(worker, {address!r})"
     return subprocess.Popen(
         [sys.executable, "-c", code],
@@ -107,21 +40,14 @@ def alone(name: str, address: str) -> subprocess.Popen[str]:
     )
 
 
-def test_an_error_of_one_process_ends_all(tmp_path: Path) -> None:
-    said, _ = start("fails", tmp_path).communicate()
-    *told, last = [json.loads(line) for line in said.splitlines()]
-    told.sort(key=lambda message: message["rank"])
-    assert told == [{"rank": 0, "gpus": "4,GPU-5"}, {"rank": 1, "gpus": "4,GPU-5"}]
-    assert last == {"problem": "the second has had enough\n  give it a rest"}
-    assert len(list((tmp_path / "logs").glob("*/localhost*.log"))) == 3
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_asks_the_processes_to_stop_and_lets_them(tmp_path: Path, number: int) -> None:
-    parent = start("stops", tmp_path)
+    parent = start("stops", tmp_path, GPUS)
     assert parent.stdout is not None
     with parent.stdout:
-        assert {json.loads(parent.stdout.readline())["rank"] for _ in range(2)} == {0, 1}
+        told = [json.loads(parent.stdout.readline()) for _ in range(2)]
+        told.sort(key=lambda message: message["rank"])
+        assert told == [{"rank": rank, "gpus": "4,GPU-5"} for rank in (0, 1)]
         # Ctrl-C reaches every process of a terminal.
         (os.killpg if number == signal.SIGINT else os.kill)(parent.pid, number)
         assert [json.loads(line) for line in parent.stdout] == [{"stopped": True}]
@@ -170,7 +96,7 @@ def test_a_process_exits_when_its_connection_is_closed(tmp_path: Path) -> None:
 
 
 def test_a_killed_parent_leaves_no_process_and_no_lock(tmp_path: Path) -> None:
-    parent = start("lasts", tmp_path)
+    parent = start("lasts", tmp_path, GPUS)
     assert parent.stdout is not None
     with parent.stdout:
         workers = [json.loads(parent.stdout.readline())["process"] for _ in range(2)]

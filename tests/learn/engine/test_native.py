@@ -25,7 +25,7 @@ from draft.learn.engine.worlds.simulate import make
 from draft.learn.task.config import STAGES, Config
 from draft.learn.task.mdp.environment import environment
 from draft.learn.task.world.task import Task
-from tests.learn.alone import compiled
+from tests.learn.alone import check_masses, compiled
 from tests.learn.small import SMALL
 
 # A box with an arm on a plane.
@@ -218,48 +218,6 @@ def test_boxes_slide_as_far_as_the_friction_of_their_worlds_lets_them() -> None:
     assert far[0] == pytest.approx(1 - 0.01 * 9.81 / 2, rel=0.02)
 
 
-def full_mass(model: Any, entries: np.ndarray) -> np.ndarray:
-    """Mass matrix from what MuJoCo keeps of it."""
-    data, found = mujoco.MjData(model), np.zeros((model.nv, model.nv))
-    data.M[:] = entries
-    mujoco.mj_fullM(model, data, found)
-    return found
-
-
-def check_masses(env: Any, models: list[Any]) -> list[np.ndarray]:
-    """Check that each world's mass matrix is that of its own model, in random poses."""
-    kept = env.sim._batch.bind("M")
-    drawn, found = np.random.default_rng(0), []
-    for _ in range(5):
-        quat = drawn.normal(size=(env.num_envs, 4))
-        joints = drawn.uniform(-1.5, 1.5, (env.num_envs, 12))
-        place = drawn.normal(size=(env.num_envs, 3))
-        quat /= np.linalg.norm(quat, axis=1, keepdims=True)
-        pose = np.concatenate((place, quat, joints), axis=1)
-        env.sim.state[:, 1:20] = torch.from_numpy(pose)
-        env.sim.forward()
-        for world, model in enumerate(models):
-            data = mujoco.MjData(model)
-            data.qpos[:] = pose[world]
-            mujoco.mj_forward(model, data)
-            own = full_mass(model, data.M)
-            found.append(full_mass(env.sim.mj_model, kept[world]))
-            size = np.sqrt(np.outer(np.diag(own), np.diag(own)))
-            assert (np.abs(found[-1] - own) / size).max() < 1e-9
-    return found
-
-
-def test_each_world_of_a_family_has_the_mass_matrix_of_its_own_model(
-    members: tuple[LeggedRobot, ...],
-) -> None:
-    env = make(environment(Task(members, ground="flat"), 6, play=True), "cpu", "native")
-    models = compiled(members, Config())
-    found = check_masses(env, [*models, *models])
-    trunks = [each[0, 0] for each in found[:3]]
-    assert trunks == pytest.approx([model.body_mass.sum() for model in models])
-    assert len(set(trunks)) == 3
-
-
 def test_a_shifted_centre_of_mass_is_that_of_the_worlds_own_physics(
     members: tuple[LeggedRobot, ...],
 ) -> None:
@@ -273,7 +231,7 @@ def test_a_shifted_centre_of_mass_is_that_of_the_worlds_own_physics(
         assert 1e-4 < np.abs(model.body_ipos[1] - before).max() < 0.03
         mujoco.mj_setConst(model, mujoco.MjData(model))
         models.append(model)
-    check_masses(env, models)
+    check_masses(env, models, 1e-9)
 
 
 def test_every_number_that_randomisation_may_change_has_the_shape_it_has_on_warp(

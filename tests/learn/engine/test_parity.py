@@ -24,16 +24,22 @@ from tests.learn.small import SMALL
 STATES = 256
 
 
-@pytest.fixture(scope="module")
-def pair(members: tuple[LeggedRobot, ...]) -> Iterator[tuple[Any, Any]]:
-    """The same robots on both engines, on a plane, without noise, pushes and ends of episodes."""
+def both(task: Task, worlds: int) -> list[Any]:
+    """A task on both engines, without noise, pushes and ends of episodes."""
     made = []
     for engine in ("native", "warp"):
-        settings = environment(Task(members[:1], ground="flat"), STATES, play=True)
+        settings = environment(task, worlds, play=True)
         settings.terminations = {}
         made.append(make(settings, "cpu", engine))
         made[-1].reset(seed=0)
-    yield tuple(made)
+    return made
+
+
+@pytest.fixture(scope="module")
+def pair(members: tuple[LeggedRobot, ...]) -> Iterator[list[Any]]:
+    """The same robots on a plane on both engines."""
+    made = both(Task(members[:1], ground="flat"), STATES)
+    yield made
     for env in made:
         env.close()
 
@@ -87,7 +93,7 @@ def outcome(env: Any, state: dict[str, Any], action: torch.Tensor) -> dict[str, 
 
 
 @pytest.fixture(scope="module")
-def outcomes(pair: tuple[Any, Any]) -> tuple[dict[str, torch.Tensor], ...]:
+def outcomes(pair: list[Any]) -> tuple[dict[str, torch.Tensor], ...]:
     """Outcomes of one step on either engine: of 256 robots that walk, then of 256 that tumble."""
     found: list[dict[str, list[torch.Tensor]]] = [{}, {}]
     for seed, begin in enumerate((walking, tumbling)):
@@ -168,13 +174,8 @@ def test_rewards_are_the_same_on_both_engines(outcomes: Any) -> None:
 def test_on_uneven_ground_feet_touch_alike_and_stairs_are_the_same_on_both_engines(
     members: tuple[LeggedRobot, ...],
 ) -> None:
-    config, worlds = Config().with_values(SMALL), 128
-    pair = []
-    for engine in ("native", "warp"):
-        settings = environment(Task(members[:1], config=config), worlds, play=True)
-        settings.terminations = {}
-        pair.append(make(settings, "cpu", engine))
-        pair[-1].reset(seed=0)
+    worlds = 128
+    pair = both(Task(members[:1], config=Config().with_values(SMALL)), worlds)
     drawn = torch.Generator().manual_seed(0)
     for _ in range(20):
         pair[0].step(torch.randn(worlds, 12, generator=drawn))

@@ -23,6 +23,7 @@ from draft.learn.measuring.scalars import Worlds, curves, scalars  # noqa: E402
 from draft.learn.task.config import Config  # noqa: E402
 from draft.learn.task.world.access import GROUND  # noqa: E402
 from draft.learn.task.world.task import Task  # noqa: E402
+from tests.learn.runs import QUICK  # noqa: E402
 from tests.learn.small import SMALL  # noqa: E402
 
 CONFIG = Config().with_values(SMALL)
@@ -106,8 +107,8 @@ def test_a_robot_that_is_held_stands_and_keeps_its_command(family: Trial, flat: 
 
 
 def test_a_robot_that_thrashes_falls_and_scores_nothing(members: Any) -> None:
-    asked = levels("speed", 1.0), levels("push", 1.0)
-    worlds, counted = evaluate(trial(members[:1], *asked, replicas=2), thrashing, "cpu")
+    of = trial(members[:1], levels("speed", 1.0), levels("push", 1.0), replicas=2)
+    worlds, counted = evaluate(of, thrashing, "cpu", engine=QUICK)
     assert worlds.fell.all()
     made = scalars(curves(worlds), 0.48)
     assert set(made.values.values()) == {None}
@@ -118,7 +119,7 @@ def test_a_robot_that_thrashes_falls_and_scores_nothing(members: Any) -> None:
 def test_equal_seeds_agree_and_others_do_not(members: Any) -> None:
     def run(seed: int) -> tuple[Worlds, Any]:
         asked = trial(members[:1], levels("push", 2.0), replicas=3, seed=seed, seconds=0.6)
-        return evaluate(asked, still, "cpu")
+        return evaluate(asked, still, "cpu", engine=QUICK)
 
     (one, counted), (same, counted_too), (other, _) = run(5), run(5), run(6)
     assert all(np.array_equal(getattr(one, n), getattr(same, n)) for n in vars(one))
@@ -128,7 +129,7 @@ def test_equal_seeds_agree_and_others_do_not(members: Any) -> None:
 
 
 def test_kicks_come_at_three_six_and_nine_seconds(members: Any) -> None:
-    of = Trial(Task(members[:1], "push", CONFIG), (levels("push", 1.0, 12.0),), replicas=1)
+    of = Trial(Task(members[:1], "push", CONFIG), (levels("push", 1.0, 12.0),), 1, 12.0, 2.0)
     params = env_cfg(of, of.tests, layout(of, of.tests)).events["kick"].params
     assert params == {"most": (1.0, 12.0), "steps": (150, 300, 450)}
     for seconds in (0.5, 1.3, 8.1, 12.1):

@@ -24,6 +24,7 @@ def test_a_body_is_measured_with_three_policies_once(
     monkeypatch.setattr(family, "SPEEDS", (1.0,))
     monkeypatch.setattr(family, "KICKS", (1.0,))
     monkeypatch.setattr(family, "SECONDS", 4.0)
+    # What is learnt is not looked at: how often, from what, and what is kept of it.
     monkeypatch.setattr(draft, "train", partial(draft.train, envs=8))
     body = family.drawn(1, seed=1)[0]
 

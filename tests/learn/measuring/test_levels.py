@@ -10,7 +10,6 @@ from draft.errors import DraftError
 from draft.learn.measuring.levels import (
     SKILL_TESTS,
     Reached,
-    check_stage,
     flags,
     of_stage,
     skill_tests,
@@ -63,12 +62,6 @@ def test_levels_that_make_no_sense_are_refused(levels: int | list[float]) -> Non
 def test_levels_of_several_tests_are_refused() -> None:
     with pytest.raises(DraftError, match="there are 2"):
         skill_tests(["speed", "push"], [1.0, 2.0])
-
-
-def test_a_test_of_another_stage_is_refused() -> None:
-    check_stage(skill_tests(["speed"]), "velocity", "run")
-    with pytest.raises(DraftError, match="'stairs' is for policies of stage terrain, and run is"):
-        check_stage(skill_tests(["stairs"]), "velocity", "run")
 
 
 @pytest.mark.parametrize(

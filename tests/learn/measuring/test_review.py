@@ -14,9 +14,9 @@ pytest.importorskip("mjlab")
 from draft import learn
 from draft.learn.engine.machine import NATIVE
 from draft.learn.measuring.rollout import review
-from draft.learn.training.ppo.trainer import Trainer
 from draft.learn.training.ppo.warm_start import ALONE
 from draft.learn.training.run import Run
+from tests.learn.runs import train
 from tests.learn.small import plan
 
 FLAT: dict[str, Any] = {"ground": "flat", "see_ground": False}
@@ -29,21 +29,20 @@ RUNS: dict[str, Any] = {
 
 @pytest.fixture(autouse=True)
 def brief(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Long enough for a policy to walk, which is all that is compared.
     monkeypatch.setattr(review, "SECONDS", 3.0)
 
 
-def trained(folder: Path, origin: str | Path | None, **words: Any) -> Run:
-    """A run of one iteration."""
+def of(folder: Path, origin: str | Path, **words: Any) -> Run:
+    """A run of one iteration that starts from a policy."""
     run = learn.begin(folder, plan(**words), {}, origin)
-    trainer = Trainer(run, "cpu")
-    trainer.train(1)
-    trainer.close()
+    train(run, 1)
     return run
 
 
 def test_a_policy_that_has_not_learnt_yet_does_as_it_did_before(tmp_path: Path) -> None:
     assert ALONE > 1  # In the first iteration only the critic learns.
-    run = trained(tmp_path / "run", "family", **RUNS)
+    run = of(tmp_path / "run", "family", **RUNS)
     now = review.review(run, "cpu", NATIVE, 4)
     before = review.before(run, "cpu", NATIVE, 4)
     assert [one.level for one in now] == [one.level for one in before]
@@ -55,8 +54,8 @@ def test_a_policy_that_has_not_learnt_yet_does_as_it_did_before(tmp_path: Path) 
 
 
 def test_a_run_goes_on_from_another_of_its_stage(tmp_path: Path) -> None:
-    trained(tmp_path / "first", "scratch", **FLAT)
-    run = trained(tmp_path / "second", tmp_path / "first", **FLAT)
+    of(tmp_path / "first", "scratch", **FLAT)
+    run = of(tmp_path / "second", tmp_path / "first", **FLAT)
     assert len(review.before(run, "cpu", NATIVE, 2)) == 4
     moved = tmp_path / "elsewhere"
     moved.mkdir()
@@ -69,11 +68,11 @@ def test_a_run_goes_on_from_another_of_its_stage(tmp_path: Path) -> None:
 
 
 def test_nothing_is_compared_with_a_policy_of_another_stage_or_none(tmp_path: Path) -> None:
-    base = trained(tmp_path / "base", "scratch", **FLAT)
+    base = of(tmp_path / "base", "scratch", **FLAT)
     assert review.before(base, "cpu", NATIVE, 2) == []
-    pushed = trained(tmp_path / "push", tmp_path / "base", stage="push", **FLAT)
+    pushed = of(tmp_path / "push", tmp_path / "base", stage="push", **FLAT)
     assert review.before(pushed, "cpu", NATIVE, 2) == []
-    blind = trained(tmp_path / "blind", "scratch", stage="velocity", **FLAT)
-    sighted = trained(tmp_path / "sighted", blind.folder, stage="velocity", ground="uneven")
+    blind = of(tmp_path / "blind", "scratch", stage="velocity", **FLAT)
+    sighted = of(tmp_path / "sighted", blind.folder, stage="velocity", ground="uneven")
     assert sighted.plan.see_ground
     assert review.before(sighted, "cpu", NATIVE, 2) == []

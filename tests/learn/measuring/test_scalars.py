@@ -18,7 +18,6 @@ from draft.learn.measuring.scalars import (
     kick,
     median_speed,
     scalars,
-    survival,
     tallest,
     traversed,
 )
@@ -31,10 +30,6 @@ def both(*parts: Worlds) -> Worlds:
 
 def found(*parts: Worlds, leg: float = 0.48) -> Scalars:
     return scalars(curves(both(*parts)), leg)
-
-
-def test_survival_is_the_share_that_never_fell() -> None:
-    assert survival(stood("walk", {0.4: 7})) == pytest.approx(0.7)
 
 
 def test_speed_is_the_median_over_those_that_did_not_fall() -> None:

@@ -13,6 +13,7 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("mjlab")
 
 from draft.cli import main  # noqa: E402
+from draft.design import Design  # noqa: E402
 from draft.design.references import open_design  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
 from draft.learn.bodies.designs import open_bodies  # noqa: E402
@@ -20,18 +21,18 @@ from draft.learn.bodies.features import family_features, features  # noqa: E402
 from draft.learn.bodies.legged import legged_robot  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.measuring import learned_metrics as learned  # noqa: E402
+from draft.learn.measuring.evaluation_options import BodyRollOuts  # noqa: E402
 from draft.learn.measuring.policies import _of_file, of_run, open_source  # noqa: E402
 from draft.learn.measuring.rollout.evaluate import evaluate  # noqa: E402
 from draft.learn.measuring.rollout.trial import Trial  # noqa: E402
-from draft.learn.measuring.scalars import Worlds  # noqa: E402
 from draft.learn.measuring.surface import Surface, surface  # noqa: E402
 from draft.learn.measuring.surface_page import page  # noqa: E402
 from draft.learn.measuring.utilisation import Histograms  # noqa: E402
 from draft.learn.policy.policy import FAMILY, open_policy, policy  # noqa: E402
 from draft.learn.task.recipes import LAPTOP  # noqa: E402
-from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
-from draft.learn.training.run import Run, create, open_run  # noqa: E402
-from draft.metrics.learned import SECONDS  # noqa: E402
+from draft.learn.training.run import Plan, Run  # noqa: E402
+from tests.learn.measuring.columns import worlds  # noqa: E402
+from tests.learn.runs import begin, exported, trained  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
 pytestmark = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")
@@ -41,19 +42,16 @@ ROOT = Path(__file__).parents[3]
 PLANE = ("thigh_length=0.25,0.85", "actuators.leg.peak_torque=72,85,400")
 
 
-def _trained(folder: Path, see_design: bool) -> Run:
+def family(see_design: bool) -> Plan:
+    """A plan for six bodies on a plane."""
     members = open_bodies(["cheetah"], TRAINED, 6).members
-    of = replace(plan(ground="flat", see_ground=False), members=members, see_design=see_design)
-    run = create(folder, of, {member.name: "values: {}\n" for member in members})
-    trainer = Trainer(run, "cpu", engine="native")
-    trainer.train(1)
-    trainer.close()
-    return open_run(folder)
+    flat = plan(ground="flat", see_ground=False)
+    return replace(flat, members=members, see_design=see_design)
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return _trained(tmp_path_factory.mktemp("family") / "run", see_design=True)
+    return trained(tmp_path_factory.mktemp("family") / "run", family(see_design=True))
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +87,7 @@ def test_the_page_names_the_command_that_lets_each_design_walk(found: Surface) -
     assert f"draft studio cheetah --walk --policy my.onnx --set {chosen}" in text
 
 
-def test_listed_values_are_measured_in_their_order_however_they_are_given(
+def test_a_surface_repeats_and_its_values_are_in_their_order_however_they_are_given(
     run: Run, found: Surface
 ) -> None:
     turned = ("thigh_length=0.85,0.25", "actuators.leg.peak_torque=400,72,85")
@@ -111,14 +109,26 @@ def test_the_top_speed_is_that_after_the_run_up() -> None:
     # Roll-outs of 18 s are measured from 12 s on, three times as long as this body speeds up.
     source, design = open_source(None), open_design("cheetah")
     (short, _), (long, _) = (
-        learned.of_designs(source, design, device="cpu", replicas=2, seconds=seconds)
-        for seconds in (SECONDS, 3 * SECONDS)
+        learned.of_designs(source, design, rollouts, device="cpu")
+        for rollouts in (BodyRollOuts(replicas=2), BodyRollOuts(replicas=2, seconds=18.0))
     )
     assert short.top_speed == pytest.approx(long.top_speed, rel=0.03)
     assert short.cost_of_transport == pytest.approx(long.cost_of_transport, rel=0.1)
+    assert short.inside.all()
+    assert short.kick > 1.0
 
 
-def test_only_slow_bodies_are_asked_for_the_lower_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def two() -> Design:
+    """A cheetah, and a slow one."""
+    varied = {"thigh_length": [0.25, 0.4], "actuators.leg.peak_torque": [72.0, 40.0]}
+    arrays = {name: np.array(values) for name, values in varied.items()}
+    return open_design("cheetah").spec.resolve("cheetah", arrays)
+
+
+def test_only_slow_bodies_are_asked_for_the_lower_speeds(
+    two: Design, monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked: list[tuple[int, float, float]] = []
 
     def recorded(trial: Trial, *args: object, **options: object) -> object:
@@ -127,29 +137,22 @@ def test_only_slow_bodies_are_asked_for_the_lower_speeds(monkeypatch: pytest.Mon
         return evaluate(trial, *args, **options)  # pyright: ignore[reportArgumentType]
 
     monkeypatch.setattr("draft.learn.measuring.rollout.evaluate.evaluate", recorded)
-    monkeypatch.setattr(learned, "KICKS", learned.KICKS[:1])  # It is about speeds.
-    source, cheetah = open_source(None), open_design("cheetah")
-    thigh, torque = np.array([0.25, 0.4]), np.array([72.0, 40.0])
-    varied = {"thigh_length": thigh, "actuators.leg.peak_torque": torque}
-    both = cheetah.spec.resolve("cheetah", varied)
-    found, _ = learned.of_designs(source, both, device="cpu", replicas=1)
+    # Speeds are asked for and compared; robots that are kicked are worlds of their own.
+    monkeypatch.setattr(learned, "KICKS", learned.KICKS[:1])
+    source = open_source(None)
+    found, _ = learned.of_designs(source, two, BodyRollOuts(replicas=1), device="cpu")
     levels = learned.speeds(source)
     assert asked == [(2, levels[3], levels[-1]), (1, levels[0], levels[2])]
     monkeypatch.setattr(learned, "LEAD", np.inf)  # All are asked for all.
-    every, _ = learned.of_designs(source, both, device="cpu", replicas=1)
+    every, _ = learned.of_designs(source, two, BodyRollOuts(replicas=1), device="cpu")
     np.testing.assert_allclose(found.top_speed, every.top_speed, rtol=0.05)
 
 
-def test_progress_has_a_total_from_the_start_and_rises_to_it() -> None:
+def test_progress_has_a_total_from_the_start_and_rises_to_it(two: Design) -> None:
     told: list[tuple[int, int]] = []
-    cheetah = open_design("cheetah")
-    thigh, torque = np.array([0.25, 0.4]), np.array([72.0, 40.0])  # The second is a slow one.
-    varied = {"thigh_length": thigh, "actuators.leg.peak_torque": torque}
-    both = cheetah.spec.resolve("cheetah", varied)
-    numbers = {"device": "cpu", "replicas": 1, "seconds": 1.0}
-    learned.of_designs(
-        open_source(None), both, **numbers, report=lambda done, of: told.append((done, of))
-    )
+    few = BodyRollOuts(replicas=1, seconds=1.0)
+    source = open_source(None)
+    learned.of_designs(source, two, few, device="cpu", report=lambda *at: told.append(at))
     assert told[0] == (0, 2)
     assert told[-1] == (2, 2)
     assert told == sorted(told)
@@ -174,12 +177,6 @@ def test_the_error_of_a_mean_is_that_of_students_t() -> None:
     # t(0.95, 2) = 2.920; s = 0.1.
     assert learned._error(np.array([1.0, 1.1, 1.2])) == pytest.approx(2.920 * 0.1 / 3**0.5, 1e-3)
     assert np.isnan(learned._error(np.array([1.0])))
-
-
-def test_a_surface_repeats(run: Run, found: Surface) -> None:
-    again = surface(open_design("cheetah"), PLANE, of_run(run), replicas=2, seconds=1.0)
-    np.testing.assert_array_equal(found.learned.top_speed, again.learned.top_speed)
-    np.testing.assert_array_equal(found.learned.kick, again.learned.kick)
 
 
 def test_the_command_writes_a_table_a_figure_and_a_record(
@@ -214,8 +211,11 @@ def test_the_command_writes_a_table_a_figure_and_a_record(
     ("words", "message"),
     [
         (["--vary", "thigh_length=0.2:0.3"], "a surface needs two ranges, and --vary has 1"),
-        (["--vary", *PLANE, "--points", "1"], "--points 1 is not from 2 to 100"),
-        (["--vary", *PLANE, "--replicas", "0"], "--replicas 0 is not from 1 to 1000"),
+        (["--vary", *PLANE, "--points", "1"], "--points 1 is not a whole number from 2 to 100"),
+        (
+            ["--vary", *PLANE, "--replicas", "0"],
+            "--replicas 0 is not a whole number from 1 to 1000",
+        ),
         (["--vary", PLANE[0], "thigh=1:2"], "'thigh'"),
         (["--vary", PLANE[0], "trunk_length=1.6:1.7"], "leaves the range"),
     ],
@@ -228,28 +228,16 @@ def test_a_surface_that_cannot_be_measured_is_explained(
 
 
 def test_a_policy_that_does_not_see_its_design_is_refused(tmp_path: Path) -> None:
-    blind = _trained(tmp_path / "run", see_design=False)
-    with pytest.raises(DraftError, match="does not see its design"):
-        of_run(blind)
+    blind = begin(tmp_path / "run", family(see_design=False))
+    (blind.folder / "model_1.pt").write_bytes(b"weights")
+    for open_it in (lambda: of_run(blind), lambda: open_source(policy("cheetah").file)):
+        with pytest.raises(DraftError, match="does not see its design"):
+            open_it()
 
 
-def test_a_surface_of_the_shipped_policy_needs_no_run(capsys: pytest.CaptureFixture[str]) -> None:
-    source = open_source()
-    assert source.name == "the family of quadrupeds"
-    one = ("thigh_length=0.25,0.3", "actuators.leg.peak_torque=70,90")
-    found = surface(open_design("cheetah"), one, source, replicas=2, seconds=3.0)
-    assert found.learned.inside.all()
-    assert (found.learned.top_speed > 1.5).all()
-    assert (found.learned.kick > 1.0).all()
-
-
-def test_an_exported_policy_gives_the_surface_of_its_run(
-    run: Run, found: Surface, tmp_path: Path
-) -> None:
+def test_an_exported_policy_gives_the_surface_of_its_run(run: Run, found: Surface) -> None:
     pytest.importorskip("onnx")
-    file = tmp_path / "policy.onnx"
-    assert main(["play", str(run.folder), "--onnx", str(file), "--engine", "native"]) == 0
-    source = replace(open_source(file), forward=of_run(run).forward)
+    source = replace(open_source(exported(run)), forward=of_run(run).forward)
     again = surface(open_design("cheetah"), PLANE, source, replicas=2, seconds=1.0)
     np.testing.assert_array_equal(again.learned.inside, found.learned.inside)
     assert again.refusal == found.refusal
@@ -265,35 +253,16 @@ def test_an_exported_policy_is_measured_with_its_own_physics_and_servos() -> Non
     assert config.actuation == replace(usual, action_scale=2 * usual.action_scale)
 
 
-def test_a_policy_of_one_design_measures_no_family() -> None:
-    with pytest.raises(DraftError, match="does not see its design"):
-        open_source(policy("cheetah").file)
-
-
 def test_a_policy_drives_no_robot_of_other_joints() -> None:
     with pytest.raises(DraftError, match="does not drive the joints of humanoid"):
         open_source().match(legged_robot(open_design("humanoid")))
 
 
 def test_the_cost_of_transport_is_electrical_power_per_weight_and_speed() -> None:
-    """Braking costs nothing: of 120 W of work 100 W drive, and 50 W heat the motors."""
-    one, count = member(), 4
-    ones = np.ones(count)
-    worlds = Worlds(
-        test=np.full(count, "speed"),
-        level=1.0 * ones,
-        member=np.full(count, one.name),
-        replica=np.arange(count),
-        fell=np.zeros(count, dtype=bool),
-        speed=0.9 * ones,
-        mechanical=120.0 * ones,
-        heat=50.0 * ones,
-        driving=100.0 * ones,
-        rise=0.0 * ones,
-        kept=np.ones(count, dtype=bool),
-    )
-    nothing = np.zeros(0)
+    # Braking costs nothing: of 120 W of work 100 W drive, and 50 W heat the motors.
+    one, nothing = member(), np.zeros(0)
+    row = {"member": one.name, "speed": 0.9, "mechanical": 120.0, "driving": 100.0, "heat": 50.0}
     samples = Histograms(nothing, nothing, nothing, np.zeros((0, 1, 3, 2)), nothing, one.classes)
-    found = learned._one(one, worlds, samples)
+    found = learned._one(one, worlds("speed", [row] * 4), samples)
     assert found.numbers["cost_of_transport"] == pytest.approx(150.0 / (one.mass * 9.81 * 0.9))
     assert found.numbers["top_speed"] == pytest.approx(0.9)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,11 +18,16 @@ import draft
 from draft.design.references import open_design
 from draft.errors import DraftError
 from draft.learn.bodies.legged import legged_robot
+from draft.learn.engine.machine import obstacle
+from draft.learn.measuring import learned_metrics as learned
+from draft.learn.measuring.evaluation_options import BodyRollOuts
+from draft.learn.measuring.policies import open_source
 from draft.learn.policy.gait import record
 from draft.learn.policy.matching import Match, Structure, match, structure_of
 from draft.learn.policy.policy import FAMILY, open_policy
 from draft.learn.policy.validity import check_drives, fit
 from draft.learn.policy.walk import Walk
+from draft.metrics import of_policy
 from draft.model import Model
 from draft.model.model import preview
 from draft.studio.walker import Walker
@@ -99,6 +106,7 @@ def made(folder: Path, shipped: Path, text: str) -> Model:
 
 
 PLAIN: dict[str, tuple[int, int, int]] = dict.fromkeys(LEGS, (1, 1, 1))
+SIGNS = {"FL": (-1, 1, -1), "FR": (1, -1, -1), "RL": (-1, -1, 1), "RR": (-1, -1, -1)}
 
 
 def walked(model: Model, seconds: float = 1.5) -> np.ndarray:
@@ -118,7 +126,7 @@ def reference(tmp_path_factory: pytest.TempPathFactory, shipped: Path) -> np.nda
     return walked(made(tmp_path_factory.mktemp("plain") / "robot", shipped, text))
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     names=st.lists(
         st.text("abcdefgh", min_size=2, max_size=6), min_size=3, max_size=3, unique=True
@@ -225,10 +233,9 @@ def test_a_policy_of_ones_own_is_matched_by_the_structure_of_its_file(
     tmp_path: Path, shipped: Path, reference: np.ndarray
 ) -> None:
     """The family's policy as one that was trained with turned axes drives the plain robot."""
-    signs = {"FL": (-1, 1, -1), "FR": (1, -1, -1), "RL": (-1, -1, 1), "RR": (-1, -1, -1)}
-    model = made(tmp_path / "own", shipped, tree(("a", "b", "c"), signs, LEGS[::-1]))
+    model = made(tmp_path / "own", shipped, tree(("a", "b", "c"), SIGNS, LEGS[::-1]))
     trained = legged_robot(model.design, model)
-    turned = np.array([sign for leg in trained.joints[::3] for sign in signs[leg[:2]]])
+    turned = np.array([sign for leg in trained.joints[::3] for sign in SIGNS[leg[:2]]])
     known = open_policy(FAMILY)
     order = [
         known.joints.index(f"{name[:2]}_{JOINTS['abc'.index(name[-1])]}") for name in trained.joints
@@ -332,3 +339,34 @@ def test_the_studio_and_a_report_let_an_import_walk(go2: Path) -> None:
     gait = record(model, seconds=3.0)
     assert gait.walks
     assert "outside the region of the policy of the family of quadrupeds" in gait.note
+
+
+def needs_mjlab(test: Any) -> Any:
+    """Skip a test that rolls out in mjlab where that or mjbatch is missing."""
+    found = importlib.util.find_spec("mjlab") and obstacle() is None
+    marked = pytest.mark.skipif(not found, reason="needs mjlab and mjbatch")(test)
+    return pytest.mark.filterwarnings("ignore")(marked)
+
+
+@needs_mjlab
+def test_other_names_signs_and_order_walk_as_fast_in_mjlab(tmp_path: Path, shipped: Path) -> None:
+    made(tmp_path / "other", shipped, tree(("swing", "thigh", "calf"), SIGNS, LEGS[::-1]))
+    source = open_source()
+    (one, _), (two, _) = (
+        learned.of_designs(source, design, BodyRollOuts(replicas=4, seconds=4.0), device="cpu")
+        for design in (open_design("quadruped"), open_design(tmp_path / "other"))
+    )
+    assert one.inside.all()
+    assert two.inside.all()
+    # Their joints start with other random offsets.
+    assert two.top_speed == pytest.approx(one.top_speed, rel=0.05)
+    assert two.kick == pytest.approx(one.kick, rel=0.25)
+
+
+@needs_mjlab
+def test_an_import_has_learned_metrics_that_say_that_it_is_outside(go2: Path) -> None:
+    design = open_design(go2)
+    found = of_policy(design, replicas=1, seconds=3.0, outside=True)
+    assert found["learned.inside"] == 0
+    assert float(found["learned.top_speed"]) > 1.5
+    assert np.isnan(float(of_policy(design, replicas=1, seconds=1.0)["learned.top_speed"]))

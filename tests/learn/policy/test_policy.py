@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,8 @@ from hypothesis import strategies as st
 import draft
 from draft.errors import DraftError
 from draft.learn.policy.controller import Controller
-from draft.learn.policy.playback import KICK_EVERY, Playback, Scenario, usual
+from draft.learn.policy.play_options import Course
+from draft.learn.policy.playback import KICK_EVERY, Playback, Scenario, playback, usual
 from draft.learn.policy.policy import FAMILY, SKILLS, Policy, designs, policy, scan_points
 from draft.learn.task.groups import Observations
 
@@ -49,8 +51,11 @@ def drive(controller: Controller, speed: float, seconds: float) -> np.ndarray:
     return np.mean(found, axis=0)
 
 
-def test_policies_are_shipped_of_these_designs() -> None:
+def test_policies_are_shipped_of_these_designs_and_nothing_else() -> None:
     assert designs() == ("bear", "cheetah", "giraffe")
+    folder = Path(draft.__file__).parent / "robots" / "quadruped" / "policies"
+    files = [*(f"{design}-{skill}.onnx" for design, skill in SHIPPED), FAMILY.name]
+    assert sorted(path.name for path in folder.iterdir()) == sorted(files)
 
 
 @pytest.mark.parametrize(("design", "skill"), SHIPPED)
@@ -75,17 +80,22 @@ def test_a_shipped_walker_walks_in_plain_mujoco(design: str) -> None:
     assert abs(sideways) < 0.15
 
 
-def test_an_unknown_design_or_skill_is_reported() -> None:
+def test_an_unknown_design_is_reported() -> None:
     with pytest.raises(DraftError, match=r"no policy of 'lion' is shipped"):
         policy("lion")
-    with pytest.raises(DraftError, match=r"there is no skill 'fly'"):
-        policy("cheetah", "fly")
 
 
-def test_an_observation_of_another_length_is_reported_with_its_parts(walker: Policy) -> None:
+def test_policies_that_do_not_fit_a_robot_or_an_observation_are_reported(
+    walker: Policy, cheetah: draft.Design
+) -> None:
     with pytest.raises(DraftError, match="has 48 numbers, not 47") as told:
         walker(np.zeros(47))
     assert "base_lin_vel 3, base_ang_vel 3" in str(told.value)
+    with pytest.raises(DraftError, match="the model has no joint 'FL_hip_roll'"):
+        Controller(walker, draft.load("hopper").resolve().build().scene())
+    other = replace(walker, terms=(*walker.terms, ("wind", 4)))
+    with pytest.raises(DraftError, match="observes wind, which a controller cannot compute"):
+        Controller(other, cheetah.build().scene())
 
 
 @given(action=st.floats(-20, 20), angle=st.floats(-3, 3), speed=st.floats(-100, 100))
@@ -98,9 +108,7 @@ def test_torques_stay_within_the_torque_speed_line(
     assert (torque <= walker.peak_torque * (1 - share) + 1e-9).all()
     assert (torque >= walker.peak_torque * (-1 - share) - 1e-9).all()
     assert (np.abs(torque) <= np.abs(walker.peak_torque) + 1e-9).all() or abs(speed) > 40
-
-
-def test_the_same_posture_needs_no_torque(walker: Policy) -> None:
+    # The posture that is asked for needs none.
     assert walker.torque(np.zeros(12), walker.home, np.zeros(12)) == pytest.approx(np.zeros(12))
 
 
@@ -134,13 +142,14 @@ def test_a_robot_that_falls_restarts_and_is_counted(cheetah: draft.Design) -> No
 
 
 def test_kicks_come_at_their_time(cheetah: draft.Design) -> None:
-    shown = Playback(policy("cheetah", "push"), cheetah, Scenario(STILL, kick=2.0))
-    still = Playback(policy("cheetah", "push"), cheetah, Scenario(STILL))
-    for _ in range(round(KICK_EVERY / shown.policy.timestep) - 2):
-        shown.step()
-        still.step()
-    np.testing.assert_array_equal(shown.data.qvel, still.data.qvel)
-    for _ in range(4):
+    shown, still = (
+        Playback(policy("cheetah", "push"), cheetah, Scenario(STILL, kick=kick))
+        for kick in (2.0, 0.0)
+    )
+    before = round(KICK_EVERY / shown.policy.timestep) - 2
+    for step in range(before + 4):
+        if step == before:
+            np.testing.assert_array_equal(shown.data.qvel, still.data.qvel)
         shown.step()
         still.step()
     assert np.linalg.norm(shown.data.qvel[:2] - still.data.qvel[:2]) > 0.1
@@ -156,21 +165,39 @@ def test_each_stage_is_shown_by_what_it_taught() -> None:
     assert push.kick > 0
 
 
-def test_a_model_without_the_joints_is_reported(walker: Policy) -> None:
-    with pytest.raises(DraftError, match="the model has no joint 'FL_hip_roll'"):
-        Controller(walker, draft.load("hopper").resolve().build().scene())
-
-
-def test_a_policy_that_observes_more_than_a_controller_computes_is_refused(
-    walker: Policy, cheetah: draft.Design
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            {"command": (math.nan, 0.0, 0.0)},
+            "`command` [nan, 0, 0] is not three numbers from -100 to 100",
+        ),
+        ({"step": 2.0}, "`step` 2 is not a number from 0 to 0.6 m"),
+        ({"kick": -3.0}, "`kick` -3 is not a number from 0 to 100 m/s"),
+        ({"seconds": 0.0}, "`seconds` 0 is not a number above 0 and of at most 600 s"),
+        ({"seconds": math.nan}, "`seconds` nan is not a number above 0 and of at most 600 s"),
+        ({"skill": "dance"}, "there is no skill 'dance'"),
+        ({"policy": "none.onnx"}, "cannot read none.onnx"),
+    ],
+)
+def test_bad_arguments_are_one_line_with_what_to_give(
+    arguments: dict[str, Any], message: str
 ) -> None:
-    other = replace(walker, terms=(*walker.terms, ("wind", 4)))
-    with pytest.raises(DraftError, match="observes wind, which a controller cannot compute"):
-        Controller(other, cheetah.build().scene())
+    with pytest.raises(draft.DraftError) as raised:
+        draft.play("quadruped", **arguments)
+    assert message in str(raised.value)
+    assert raised.value.problems[0].remedy
 
 
-def test_a_folder_of_policies_holds_nothing_else() -> None:
-    folder = Path(draft.__file__).parent / "robots" / "quadruped" / "policies"
-    assert sorted(path.name for path in folder.iterdir()) == sorted(
-        [*(f"{design}-{skill}.onnx" for design, skill in SHIPPED), FAMILY.name]
-    )
+def test_a_skill_sets_the_scene_unless_it_is_given(cheetah: draft.Design) -> None:
+    climbing, _ = playback(cheetah, "climb")
+    assert climbing.policy.stage == "terrain"
+    assert climbing.model.ngeom > playback(cheetah, "climb", course=Course(step=0.0))[0].model.ngeom
+    assert playback(cheetah, "push", course=Course(kick=0.5))[0].kick == 0.5
+
+
+def test_a_robot_outside_the_region_is_played_with_a_warning() -> None:
+    longer = draft.load("quadruped").resolve({"thigh_length": 0.5})
+    _, warning = playback(longer)
+    assert "outside the region of the policy" in warning
+    assert playback(draft.load("quadruped").resolve())[1] == ""

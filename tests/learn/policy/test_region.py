@@ -33,17 +33,15 @@ FAMILY_NAME = "the family of quadrupeds"
 Values = Mapping[str, float] | str
 
 
-@pytest.fixture(scope="module")
-def spec() -> draft.Spec:
-    return draft.load("quadruped")
+SPEC = draft.load("quadruped")
 
 
 def fitted(values: Values, skill: str = "walk") -> Fit:
-    return fit(preview(draft.load("quadruped").resolve(values)), skill)
+    return fit(preview(SPEC.resolve(values)), skill)
 
 
 def robot(values: Values = "cheetah") -> LeggedRobot:
-    return legged_robot(draft.load("quadruped").resolve(values))
+    return legged_robot(SPEC.resolve(values))
 
 
 @pytest.mark.parametrize("name", designs())
@@ -167,9 +165,9 @@ def test_features_are_readable_in_units_of_the_body() -> None:
     assert found["no-load speed of knee"] == pytest.approx(one.no_load_speed[2])
 
 
-def test_the_motors_and_home_are_those_of_the_design(spec: draft.Spec) -> None:
+def test_the_motors_and_home_are_those_of_the_design() -> None:
     values = {"actuators.leg.peak_torque": 60.0, "actuators.leg.no_load_speed": 30.0, "crouch": 1.2}
-    design = spec.resolve(values)
+    design = SPEC.resolve(values)
     found, trained = fit(preview(design)).policy, open_policy(FAMILY)
     assert found.peak_torque == pytest.approx(60.0)
     assert found.no_load_speed == pytest.approx(30.0)
@@ -180,7 +178,7 @@ def test_the_motors_and_home_are_those_of_the_design(spec: draft.Spec) -> None:
 
 @pytest.mark.parametrize("length", [0.22, 0.34])
 def test_the_family_walks_bodies_of_its_region(length: float) -> None:
-    model = preview(draft.load("quadruped").resolve({"thigh_length": length}))
+    model = preview(SPEC.resolve({"thigh_length": length}))
     walk = Walk(model, fit(model), (1.0, 0.0, 0.0))
     walk.advance(2.0)
     start = walk.data.qpos[0]
@@ -194,27 +192,27 @@ def test_a_robot_that_no_policy_drives_names_the_command_that_trains_one() -> No
         fit(draft.load("humanoid").resolve().build())
 
 
-def test_the_command_that_trains_a_changed_design_has_its_changes() -> None:
-    spec = draft.load("quadruped")
-    assert train_command(spec.resolve("bear")) == "draft train quadruped:bear"
-    changed = spec.resolve("bear", {"thigh_length": 0.4})
-    assert train_command(changed) == "draft train quadruped:bear --set thigh_length=0.4"
-    assert (
-        train_command(spec.resolve({"payload": 5.0})) == "draft train quadruped --set payload=5.0"
-    )
+@pytest.mark.parametrize(
+    ("words", "command"),
+    [
+        (("bear",), "quadruped:bear"),
+        (("bear", {"thigh_length": 0.4}), "quadruped:bear --set thigh_length=0.4"),
+        (({"payload": 5.0},), "quadruped --set payload=5.0"),
+    ],
+)
+def test_the_command_that_trains_a_changed_design_has_its_changes(
+    words: tuple, command: str
+) -> None:
+    assert train_command(SPEC.resolve(*words)) == f"draft train {command}"
 
 
-def test_a_policy_of_ones_own_drives_before_those_that_ship() -> None:
-    own = policy("bear", "walk")
-    found = fit(preview(draft.load("quadruped").resolve("cheetah")), policies=[own])
+def test_a_policy_of_ones_own_drives_before_those_that_ship_if_its_joints_fit() -> None:
+    own, cheetah = policy("bear", "walk"), preview(SPEC.resolve("cheetah"))
+    found = fit(cheetah, policies=[own])
     assert found.policy.file == own.file
     assert found.region.name == "quadruped:bear"
     # Its file was written before features were part of it: leg length and motors are compared.
     assert "leg length 0.48 m (trained at 0.74)" in found.warning
     assert not found.inside
-
-
-def test_a_policy_of_other_joints_leaves_the_shipped_ones() -> None:
-    other = replace(policy("bear", "walk"), joints=("a", "b"))
-    found = fit(preview(draft.load("quadruped").resolve("cheetah")), policies=[other])
-    assert found.region.name == "quadruped:cheetah"
+    other = replace(own, joints=("a", "b"))
+    assert fit(cheetah, policies=[other]).region.name == "quadruped:cheetah"

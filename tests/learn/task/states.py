@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
+import pytest
 import torch
+
+from draft.learn.engine.machine import NATIVE
+from draft.learn.engine.worlds.simulate import make
+from draft.learn.task.mdp.commands import command_term
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.recipes import LAPTOP
+from draft.learn.task.world.task import Task
+from tests.learn.small import member
 
 ROOTS = torch.tensor([1.0, 1.5416667, 2.7083333]).sqrt()  # sqrt(s) of cheetah, bear, giraffe.
 
@@ -75,5 +85,37 @@ def stand(env: Any, lift: float = 0.0, **state: Any) -> None:
 
 def ask(env: Any, vx: Any = 0.0, vy: Any = 0.0, wz: Any = 0.0) -> None:
     """Command every robot the same velocity."""
-    value = env.command_manager.get_term("twist").vel_command_b
+    value = command_term(env).vel_command_b
     value[:, 0], value[:, 1], value[:, 2] = vx, vy, wz
+
+
+def laptop(stage: str, *words: str, worlds: int, ground: Any = "flat", **values: Any) -> Any:
+    """An environment of the recipe `laptop` in the engine of CPUs, of shipped designs."""
+    config = LAPTOP.config.with_values(values)
+    members = tuple(member(word) for word in words or ("cheetah",))
+    task = Task(members, stage, config, ground, see_ground=ground == "uneven")
+    env = make(environment(task, worlds), "cpu", NATIVE)
+    env.reset()
+    return env
+
+
+def drive(env: Any, patch: pytest.MonkeyPatch, forward: Any, measured: Any, seconds: float) -> None:
+    """Command every robot straight ahead, and let the speeds that are measured be others.
+
+    Args:
+        env: the environment.
+        patch: undoes what is measured.
+        forward: commanded speeds [m/s].
+        measured: measured speeds [m/s].
+        seconds: how long [s].
+    """
+    term, ahead = command_term(env), torch.tensor([1.0, 0.0, 0.0])
+    for kind in (term.is_standing_env, term.is_heading_env):
+        kind[:] = False
+    both = torch.zeros(2, env.num_envs)
+    both[0], both[1] = forward, measured
+    term.vel_command_b[:], speeds = both[..., None] * ahead
+    data = SimpleNamespace(root_link_lin_vel_b=speeds, heading_w=torch.zeros(env.num_envs))
+    patch.setattr(term, "robot", SimpleNamespace(data=data))
+    for _ in range(round(seconds / env.step_dt)):
+        term._update_command()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,83 +15,70 @@ pytest.importorskip("mjbatch")
 import torch
 
 from draft.learn.engine.machine import NATIVE
-from draft.learn.engine.worlds.simulate import make
 from draft.learn.task.config import Config
 from draft.learn.task.constants import Scaled
 from draft.learn.task.mdp import curriculums, rewards
-from draft.learn.task.mdp.environment import environment
+from draft.learn.task.mdp.commands import command_term
 from draft.learn.task.recipes import LAPTOP
 from draft.learn.task.world.ground import worlds_on
-from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.trainer import Trainer
 from draft.learn.training.run import Origin, create, file_digest
 from tests.learn.small import member, plan
+from tests.learn.task.states import ask, drive, laptop, place
 
 WORLDS = 16
 DESIGN = {"cheetah": "values: {}\n"}
-
-
-def built(stage: str, ground: Any = "flat", design: str = "cheetah", **values: Any) -> Any:
-    config = LAPTOP.config.with_values(
-        {"observations.map_pitch": 0.1, "ground.border": 2.0, "ground.rows": 3} | values
-    )
-    task = Task((member(design),), stage, config, ground, see_ground=ground == "uneven")
-    env = make(environment(task, WORLDS), "cpu", NATIVE)
-    env.reset()
-    return env
+UNEVEN = {"observations.map_pitch": 0.1, "ground.border": 2.0, "ground.rows": 3}
 
 
 @pytest.fixture(scope="module")
 def running() -> Any:
-    return built("velocity")
+    return laptop("velocity", worlds=WORLDS)
 
 
 @pytest.fixture(scope="module")
 def climbing() -> Any:
-    return built("terrain", "uneven")
+    return laptop("terrain", worlds=WORLDS, ground="uneven", **UNEVEN)
 
 
-def commands(env: Any) -> Any:
-    return env.command_manager.get_term("twist")
-
-
-def walk(
-    env: Any, monkeypatch: pytest.MonkeyPatch, share: float, seconds: float, grown: float = 0.0
-) -> float:
-    """Let all robots hold a share of a fast command; returns by how much the range has grown."""
-    term = commands(env)
+# After 1.5 s four samples per world are enough; then 0.9 m/s is fast for 1.2 m/s too. The recipe's
+# range never shrinks: speeds below `missed` of the command let it.
+@pytest.mark.parametrize(
+    ("share", "seconds", "grown", "missed", "change"),
+    [
+        pytest.param(0.85, 1.55, 0.0, None, 0.0, id="tracked too shortly"),
+        pytest.param(0.85, 1.65, 0.0, None, 0.2, id="tracked"),
+        pytest.param(0.85, 3.0, 0.0, None, 0.4, id="tracked twice as long"),
+        pytest.param(0.75, 5.0, 0.0, None, 0.0, id="not tracked"),
+        pytest.param(0.65, 1.65, 1.0, None, 0.0, id="missed, and the recipe's never shrinks"),
+        pytest.param(0.65, 1.65, 1.0, 0.7, -0.2, id="missed"),
+        pytest.param(0.75, 1.65, 1.0, 0.7, 0.0, id="neither missed nor tracked"),
+        pytest.param(0.85, 1.65, 1.0, 0.7, 0.2, id="tracked where it may shrink"),
+        pytest.param(0.65, 1.65, 0.0, 0.7, 0.0, id="missed at the start of the range"),
+    ],
+)
+def test_the_fastest_command_grows_where_fast_ones_are_tracked_and_shrinks_where_missed(
+    running: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    share: float,
+    seconds: float,
+    grown: float,
+    missed: float | None,
+    change: float,
+) -> None:
+    term: Any = command_term(running)
+    if missed is not None:
+        monkeypatch.setattr(term.cfg, "growth", term.cfg.growth._replace(missed=missed))
     for one in (term._reached, term._since):
         one.zero_()
     term.grown.fill_(grown)
-    for kind in (term.is_standing_env, term.is_heading_env):
-        kind[:] = False
-    term.vel_command_b[:] = torch.tensor([0.9, 0.0, 0.0])
-
-    class Data:
-        root_link_lin_vel_b = torch.tensor([[0.9 * share, 0.0, 0.0]]).expand(WORLDS, 3)
-        heading_w = torch.zeros(WORLDS)
-
-    class Walker:
-        data = Data()
-
-    monkeypatch.setattr(term, "robot", Walker())
     before = term.range_now()[0, 0].item()
-    for _ in range(round(seconds / env.step_dt)):
-        term._update_command()
-    return term.range_now()[0, 0].item() - before
-
-
-def test_the_fastest_command_grows_once_fast_ones_are_tracked(
-    running: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # After 1.5 s four samples per world are enough; then 0.9 m/s is fast for 1.2 m/s too.
-    assert walk(running, monkeypatch, share=0.85, seconds=1.55) == pytest.approx(0.0)
-    assert walk(running, monkeypatch, share=0.85, seconds=1.65) == pytest.approx(0.2)
-    assert walk(running, monkeypatch, share=0.85, seconds=3.0) == pytest.approx(0.4)
+    drive(running, monkeypatch, 0.9, 0.9 * share, seconds)
+    assert term.range_now()[0, 0].item() - before == pytest.approx(change)
 
 
 def test_a_reset_of_some_robots_is_no_sample(running: Any) -> None:
-    term = commands(running)
+    term: Any = command_term(running)
     term._since.zero_()
     term._update_command(torch.arange(2))
     assert not term._since.any()
@@ -99,48 +86,14 @@ def test_a_reset_of_some_robots_is_no_sample(running: Any) -> None:
     assert term._since.all()
 
 
-def test_the_fastest_command_stays_where_fast_ones_are_not_tracked(
-    running: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert walk(running, monkeypatch, share=0.75, seconds=5.0) == pytest.approx(0.0)
-
-
-def test_the_fastest_command_shrinks_where_fast_ones_are_missed_but_not_below_its_start(
-    running: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    term = commands(running)
-    walked = partial(walk, running, monkeypatch, seconds=1.65)
-    assert walked(share=0.65, grown=1.0) == pytest.approx(0.0)  # The recipe's never shrinks.
-    monkeypatch.setattr(term.cfg, "growth", term.cfg.growth._replace(missed=0.7))
-    assert walked(share=0.65, grown=1.0) == pytest.approx(-0.2)
-    assert walked(share=0.75, grown=1.0) == pytest.approx(0.0)
-    assert walked(share=0.85, grown=1.0) == pytest.approx(0.2)
-    assert walked(share=0.65, grown=0.0) == pytest.approx(0.0)
-
-
 def test_each_group_of_worlds_grows_by_what_it_tracks_itself(
     running: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    term = commands(running)
-    before = term.group
-    group = torch.arange(WORLDS) % 2
+    term: Any = command_term(running)
+    before, group = term.group, torch.arange(WORLDS) % 2
     term.divide(group, 2)
-    speed = torch.where(group == 0, 0.8, 0.6)[:, None] * torch.tensor([1.0, 0.0, 0.0])
-
-    class Walker:
-        class Data:
-            root_link_lin_vel_b = speed
-            heading_w = torch.zeros(WORLDS)
-
-        data = Data()
-
-    for kind in (term.is_standing_env, term.is_heading_env):
-        kind[:] = False
     term._since.zero_()
-    term.vel_command_b[:] = torch.tensor([0.9, 0.0, 0.0])
-    monkeypatch.setattr(term, "robot", Walker())
-    for _ in range(round(1.65 / running.step_dt)):
-        term._update_command()
+    drive(running, monkeypatch, 0.9, torch.where(group == 0, 0.8, 0.6), 1.65)
     assert term.grown.tolist() == [1.0, 0.0]
     term.divide(before, 1)
 
@@ -148,7 +101,7 @@ def test_each_group_of_worlds_grows_by_what_it_tracks_itself(
 def test_commands_begin_with_the_range_of_the_base_stage_and_end_below_that_of_the_stage(
     running: Any,
 ) -> None:
-    term = commands(running)
+    term: Any = command_term(running)
     term.grown.zero_()
     assert term.range_now()[0, 0] == pytest.approx(1.0)
     term.grown.fill_(1000.0)
@@ -157,11 +110,10 @@ def test_commands_begin_with_the_range_of_the_base_stage_and_end_below_that_of_t
 
 
 def test_most_robots_are_led_straight_away_along_their_heading(climbing: Any) -> None:
-    term, robot = commands(climbing), climbing.scene["robot"]
+    term: Any = command_term(climbing)
     yaw = torch.linspace(-3.0, 3.0, WORLDS)
-    pose = torch.zeros(WORLDS, 7)
-    pose[:, 3], pose[:, 6] = (yaw / 2).cos(), (yaw / 2).sin()
-    robot.write_root_link_pose_to_sim(pose)
+    none = torch.zeros(WORLDS)
+    place(climbing, quat=torch.stack(((yaw / 2).cos(), none, none, (yaw / 2).sin()), dim=1))
     torch.manual_seed(0)
     flat = worlds_on(climbing, "flat")
     assert flat is not None
@@ -182,8 +134,8 @@ def test_most_robots_are_led_straight_away_along_their_heading(climbing: Any) ->
 
 
 def test_a_slow_design_is_led_no_faster_than_its_limit() -> None:
-    env = built("terrain", "uneven", design="giraffe")
-    term, slow = commands(env), member("giraffe")
+    env = laptop("terrain", "giraffe", worlds=WORLDS, ground="uneven", **UNEVEN)
+    term, slow = command_term(env), member("giraffe")
     most = LAPTOP.config.terrain.limit * slow.top_speed
     assert most < LAPTOP.config.terrain.forward[1] * slow.scale**0.5
     for _ in range(20):
@@ -198,15 +150,11 @@ def test_progress_is_the_share_of_the_command_that_is_walked(
     moved = torch.tensor([[0.4, 0.7, 0.0], [0.3, -0.5, 0.0], [2.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
     monkeypatch.setattr(rewards, "command_of", lambda env: asked)
 
-    class Robot:
-        class data:  # noqa: N801
-            root_link_lin_vel_b = moved
-
-        @staticmethod
-        def scaled(number: Scaled) -> torch.Tensor:
-            return torch.full((4,), number.value)
-
-    monkeypatch.setattr(rewards, "robot_of", lambda env: Robot)
+    robot = SimpleNamespace(
+        data=SimpleNamespace(root_link_lin_vel_b=moved),
+        scaled=lambda number: torch.full((4,), number.value),
+    )
+    monkeypatch.setattr(rewards, "robot_of", lambda env: robot)
     found = rewards.progress(climbing, Scaled(0.05))
     torch.testing.assert_close(found, torch.tensor([0.5 / rewards.ENOUGH, -1.0, 1.0, 0.0]))
 
@@ -227,19 +175,15 @@ def test_the_penalty_on_changes_of_the_action_grows_over_the_first_iterations(
 
 def test_a_robot_that_falls_or_turns_back_does_not_move_up(climbing: Any) -> None:
     env, terrain = climbing, climbing.scene.terrain
-    robot, term = env.scene["robot"], commands(env)
     terrain.terrain_levels[:] = 1
     ids = torch.arange(WORLDS)
     terrain.update_env_origins(ids, torch.zeros(WORLDS) > 0, torch.zeros(WORLDS) > 0)
-    term.vel_command_b[:] = torch.tensor([0.8, 0.0, 0.0])
+    ask(env, 0.8)
     env.common_step_counter = 100
-    pose = torch.zeros(WORLDS, 7)
-    pose[:, :3], pose[:, 3] = env.scene.env_origins, 1.0
     # 0.8 m/s for 7 s are 5.6 m, more than the 4 m that lead a row up at most.
-    way = torch.tensor([4.1, 4.1, 3.0, 1.0] * (WORLDS // 4))
-    pose[:, 0] += way
-    robot.write_root_link_pose_to_sim(pose)
-    env.sim.forward()
+    at = env.scene.env_origins.clone()
+    at[:, 0] += torch.tensor([4.1, 4.1, 3.0, 1.0] * (WORLDS // 4))
+    place(env, at)
     env.termination_manager._terminated_buf[:] = torch.tensor([False, True, False, False] * 4)
     t = LAPTOP.config.terrain
     curriculums.rows(env, ids, t.promotion, t.demotion, by_way=True)

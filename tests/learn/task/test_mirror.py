@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -12,14 +11,17 @@ pytest.importorskip("mjlab")
 
 import torch
 from mjlab.envs import ManagerBasedRlEnv
+from mjlab.utils.lab_api.math import quat_apply, quat_from_euler_xyz
 
-import draft
 from draft.errors import DraftError
-from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.task.mdp.commands import command_term
 from draft.learn.task.mdp.environment import environment
 from draft.learn.task.world import mirror
 from draft.learn.task.world.access import GROUND
 from draft.learn.task.world.task import Task
+from tests.learn.small import member
+from tests.learn.task.states import place
 
 POLAR = (1.0, -1.0, 1.0)
 AXIAL = (-1.0, 1.0, -1.0)
@@ -27,7 +29,7 @@ AXIAL = (-1.0, 1.0, -1.0)
 
 @pytest.fixture(scope="module")
 def cheetah() -> LeggedRobot:
-    return legged_robot(draft.load("quadruped").resolve("cheetah"))
+    return member()
 
 
 @pytest.fixture(scope="module")
@@ -42,25 +44,21 @@ def env(cheetah: LeggedRobot) -> Any:
 def start_mirrored(env: Any, member: LeggedRobot) -> None:
     """Put the first world in a state without symmetry, and the second in its mirror image."""
     env.reset()
-    state, index = env.sim.data, env.scene["robot"].indexing
     torch.manual_seed(4)
-    roll, pitch, yaw = 0.12, -0.09, 0.4
-    position, velocity = torch.tensor([0.3, 0.7, member.height + 0.005]), torch.randn(6) * 0.4
-    q, qd = torch.tensor(member.home) + 0.1 * torch.randn(12), torch.randn(12)
-    for world, sign in ((0, 1.0), (1, -1.0)):
-        quaternion = quaternion_of(sign * roll, pitch, sign * yaw)
-        linear, angular = velocity[:3].clone(), velocity[3:].clone()
-        at, joints, speeds = position.clone(), q, qd
-        if world == 1:
-            at *= torch.tensor(POLAR)
-            linear *= torch.tensor(POLAR)
-            angular *= torch.tensor(AXIAL)
-            joints, speeds = other_side(q, member), other_side(qd, member)
-        state.qpos[world, index.free_joint_q_adr] = torch.cat((at, quaternion))
-        state.qvel[world, index.free_joint_v_adr] = torch.cat((linear, angular))
-        state.qpos[world, index.joint_q_adr] = joints
-        state.qvel[world, index.joint_v_adr] = speeds
-    command = env.command_manager.get_term("twist")
+    polar, axial = torch.tensor([[1.0] * 3, POLAR]), torch.tensor([[1.0] * 3, AXIAL])
+    linear, angular = torch.randn(2, 3) * 0.4
+    joints, speeds = torch.tensor(member.home) + 0.1 * torch.randn(12), torch.randn(12)
+    quat = quat_from_euler_xyz(*(torch.tensor([0.12, -0.09, 0.4]) * axial).unbind(1))
+    place(
+        env,
+        torch.tensor([0.3, 0.7, member.height + 0.005]) * polar,
+        quat,
+        linear * polar,
+        quat_apply(quat, angular * axial),
+        torch.stack((joints, other_side(joints, member))),
+        torch.stack((speeds, other_side(speeds, member))),
+    )
+    command = command_term(env)
     command.vel_command_b[:] = torch.tensor([[0.6, 0.3, -0.2], [0.6, -0.3, 0.2]])
     command.is_heading_env[:] = False
     command.is_standing_env[:] = False
@@ -75,19 +73,6 @@ def other_side(values: torch.Tensor, member: LeggedRobot) -> torch.Tensor:
         twin = member.joints.index("".join((name[0], other[name[1]], name[2:])))
         found[twin] = -values[i] if name.endswith("roll") else values[i]
     return found
-
-
-def quaternion_of(roll: float, pitch: float, yaw: float) -> torch.Tensor:
-    """Quaternion of turns about z, then y, then x."""
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in (roll, pitch, yaw))
-    return torch.tensor(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )
 
 
 def walk_mirrored(env: Any, member: LeggedRobot, steps: int) -> dict[str, torch.Tensor]:
@@ -108,26 +93,19 @@ def of_terms(env: Any, group: str, values: torch.Tensor) -> dict[str, torch.Tens
     return dict(zip(manager.active_terms[group], values.split(widths, dim=-1), strict=True))
 
 
-@pytest.mark.parametrize("group", ["actor", "critic"])
 def test_the_mirrored_robot_sees_the_mirror_image_of_what_the_robot_sees(
-    env: Any, cheetah: LeggedRobot, group: str
-) -> None:
-    seen = walk_mirrored(env, cheetah, 12)[group]
-    expected = of_terms(env, group, mirror.flips(env)[group](seen[0]))
-    for name, value in of_terms(env, group, seen[1]).items():
-        torch.testing.assert_close(value, expected[name], atol=2e-3, rtol=2e-3, msg=name)
-
-
-def test_the_robot_of_that_test_touches_the_ground_and_is_not_symmetric_itself(
     env: Any, cheetah: LeggedRobot
 ) -> None:
-    seen = walk_mirrored(env, cheetah, 12)["critic"]
-    terms = of_terms(env, "critic", seen[0])
-    assert 0 < terms["foot_contact"].sum() < 4
-    same = {"height_scan", "design"}  # Flat ground looks alike from both sides.
-    other = of_terms(env, "critic", seen[1])
-    for name in terms.keys() - same:
-        assert (terms[name] - other[name]).abs().max() > 0.004, name
+    seen = walk_mirrored(env, cheetah, 12)
+    for group, (one, other) in seen.items():
+        expected = of_terms(env, group, mirror.flips(env)[group](one))
+        for name, value in of_terms(env, group, other).items():
+            torch.testing.assert_close(value, expected[name], atol=2e-3, rtol=2e-3, msg=name)
+    # It touches the ground, and is not symmetric itself; flat ground looks alike from both sides.
+    here, there = (of_terms(env, "critic", one) for one in seen["critic"])
+    assert 0 < here["foot_contact"].sum() < 4
+    for name in here.keys() - {"height_scan", "design"}:
+        assert (here[name] - there[name]).abs().max() > 0.004, name
 
 
 def test_the_scan_of_mirrored_ground_is_mirrored(
@@ -160,29 +138,20 @@ def test_an_image_of_an_image_is_what_it_was(env: Any) -> None:
         assert not torch.equal(flip(values), values)
 
 
-def test_an_unknown_observation_is_refused(env: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    terms = env.observation_manager.active_terms
-    names = ["smell" if name == "design" else name for name in terms["actor"]]
-    monkeypatch.setitem(terms, "actor", names)
-    with pytest.raises(DraftError, match=r"(?s)observation 'smell' is not known.*learning\.mirror"):
-        mirror.flips(env)
-
-
-def test_an_observation_of_another_width_is_refused(
-    env: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    widths = env.observation_manager.group_obs_term_dim
-    monkeypatch.setitem(widths, "actor", [(6,), *widths["actor"][1:]])
-    with pytest.raises(DraftError, match=r"'base_lin_vel'.*shape \(6,\), not \(3,\)"):
-        mirror.flips(env)
-
-
-def test_a_family_whose_joints_mirror_differently_is_refused(
+def test_what_has_no_known_image_is_refused(
     env: Any, cheetah: LeggedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    other = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))
-    monkeypatch.setattr(env.scene["robot"].cfg, "members", (cheetah, other))
-    with pytest.raises(
-        DraftError, match="joints of odd mirror differently from those of quadruped"
-    ):
-        mirror.flips(env)
+    manager, robot = env.observation_manager, env.scene["robot"].cfg
+    terms, widths = manager.active_terms, manager.group_obs_term_dim
+    smell = ["smell" if name == "design" else name for name in terms["actor"]]
+    odd = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))
+    wide = [(6,), *widths["actor"][1:]]
+    for words, patch in {
+        r"(?s)observation 'smell' is not known.*learning\.mirror": (terms, "actor", smell),
+        r"'base_lin_vel'.*shape \(6,\), not \(3,\)": (widths, "actor", wide),
+        "of odd mirror differently from those of quad": (vars(robot), "members", (cheetah, odd)),
+    }.items():
+        with monkeypatch.context() as patched:
+            patched.setitem(*patch)
+            with pytest.raises(DraftError, match=words):
+                mirror.flips(env)

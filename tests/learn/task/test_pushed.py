@@ -9,31 +9,17 @@ import pytest
 pytest.importorskip("mjlab")
 import torch
 
-from draft.learn.engine.machine import NATIVE
-from draft.learn.engine.worlds.simulate import make
 from draft.learn.task.mdp import curriculums, events
-from draft.learn.task.mdp.commands import share_of_worlds
-from draft.learn.task.mdp.environment import environment
+from draft.learn.task.mdp.commands import command_term, share_of_worlds
 from draft.learn.task.recipes import LAPTOP
-from draft.learn.task.world.task import Task
-from tests.learn.small import member
-
-WORLDS = 8
-
-
-def commands(env: Any) -> Any:
-    return env.command_manager.get_term("twist")
+from tests.learn.task.states import drive, laptop
 
 
 @pytest.fixture(scope="module")
 def mixed() -> Any:
     """A quarter of the worlds is pushed; the commands of the others have grown to 3 m/s."""
-    config = LAPTOP.config.with_values({"velocity.pushed": 0.25})
-    members = tuple(member(name) for name in ("cheetah", "bear"))
-    task = Task(members, "velocity", config, "flat", see_ground=False)
-    env = make(environment(task, WORLDS), "cpu", NATIVE)
-    env.reset()
-    commands(env).grown.fill_(10.0)
+    env = laptop("velocity", "cheetah", "bear", worlds=8, **{"velocity.pushed": 0.25})
+    command_term(env).grown.fill_(10.0)
     return env
 
 
@@ -47,7 +33,7 @@ def test_the_share_is_spread_evenly(share: float) -> None:
 
 
 def test_their_commands_are_those_of_stage_push_and_do_not_grow(mixed: Any) -> None:
-    term = commands(mixed)
+    term: Any = command_term(mixed)
     assert term.pushed.tolist() == [False, False, False, True] * 2
     slow, others = term.range_now()[term.pushed], term.range_now()[~term.pushed]
     torch.testing.assert_close(slow, torch.tensor([1.0, 0.6, 0.5]).expand(2, 3))
@@ -58,27 +44,12 @@ def test_their_commands_are_those_of_stage_push_and_do_not_grow(mixed: Any) -> N
 def test_their_tracking_says_nothing_of_how_fast_the_others_run(
     mixed: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    term = commands(mixed)
-    before = term.grown.clone()
-    for kind in (term.is_standing_env, term.is_heading_env):
-        kind[:] = False
-    term.vel_command_b[:] = term.range_now() * torch.tensor([1.0, 0.0, 0.0])
-    reached = term.vel_command_b * torch.where(term.pushed, 1.0, 0.5)[:, None]
-
-    class Walker:
-        class Data:
-            root_link_lin_vel_b = reached
-            heading_w = torch.zeros(WORLDS)
-
-        data = Data()
-
-    monkeypatch.setattr(term, "robot", Walker())
-    for _ in range(200):
-        term._update_command()
+    term: Any = command_term(mixed)
+    before, most = term.grown.clone(), term.range_now()[:, 0]
+    # With those that are pushed, 0.8 of the commands would be reached, and then not.
+    drive(mixed, monkeypatch, most, most * torch.where(term.pushed, 1.0, 0.79), 4.0)
     assert term.grown.tolist() == before.tolist()
-    reached[:] = term.vel_command_b * torch.where(term.pushed, 0.0, 1.0)[:, None]
-    for _ in range(200):
-        term._update_command()
+    drive(mixed, monkeypatch, most, most * torch.where(term.pushed, 0.0, 0.81), 4.0)
     assert (term.grown > before).all()
     term.grown.copy_(before)
 
@@ -95,7 +66,7 @@ def test_their_pushes_are_those_of_stage_push_and_alike_for_all_designs(
     term.time_left[:] = mixed.step_dt
     term(mixed, None, **cfg.params)
     mixed.common_step_counter = 0
-    pushed = commands(mixed).pushed
+    pushed: Any = command_term(mixed).pushed
     strong = factor * torch.tensor([0.5, 0.5, 0.4, 0.52, 0.52, 0.78])
     torch.testing.assert_close(added[0][pushed], strong.expand(2, 6))
     roots = mixed.scene["robot"].leg_scale.sqrt()
@@ -105,7 +76,6 @@ def test_their_pushes_are_those_of_stage_push_and_alike_for_all_designs(
 
 
 def test_without_a_share_the_states_of_earlier_runs_have_the_same_tensors() -> None:
-    task = Task((member("cheetah"),), "velocity", LAPTOP.config, "flat", see_ground=False)
-    env = make(environment(task, 2), "cpu", NATIVE)
-    assert commands(env).pushed is None
+    env = laptop("velocity", worlds=2)
+    assert command_term(env).pushed is None
     assert env.event_manager.get_term_cfg("push").func._second is None

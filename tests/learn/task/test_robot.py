@@ -60,11 +60,6 @@ def test_within_the_line_the_pd_law_holds(alone: Any, share: float, ask: float) 
     torch.testing.assert_close(found, ask * peak, rtol=1e-3, atol=1e-2)
 
 
-def test_a_motor_beyond_its_no_load_speed_can_only_brake(alone: Any) -> None:
-    found, speed = torques(alone, 1.5, 5.0)
-    assert (found * speed < 0).all()
-
-
 def test_each_joint_has_the_line_of_its_own_motor(build: Any, members: Any) -> None:
     torque, speed = (72.0, 60.0, 50.0) * 4, (40.0, 30.0, 20.0) * 4
     mixed = replace(members[0], peak_torque=torque, no_load_speed=speed)

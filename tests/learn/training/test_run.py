@@ -49,16 +49,12 @@ def test_what_is_read_back_is_the_plan_that_was_written(tmp_path: Path) -> None:
     assert open_run(tmp_path / "run").plan == made
 
 
-def test_a_folder_with_something_else_is_kept(tmp_path: Path) -> None:
-    (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(DraftError, match="is not a run of Draft; it is kept"):
-        create(tmp_path, plan(), DESIGNS)
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
-
-
-def test_an_empty_folder_is_taken(tmp_path: Path) -> None:
+def test_an_empty_folder_is_taken_and_one_with_something_else_is_kept(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     assert is_run(create(tmp_path / "run", plan(), DESIGNS).folder)
+    with pytest.raises(DraftError, match="is not a run of Draft; it is kept"):
+        create(tmp_path, plan(), DESIGNS)
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 
 def test_what_a_killed_process_left_of_a_run_is_swept_and_nothing_else(
@@ -90,29 +86,44 @@ def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
         create(tmp_path / "file" / "run", plan(), DESIGNS)
 
 
-def test_a_folder_that_is_no_run_is_explained(tmp_path: Path) -> None:
-    with pytest.raises(DraftError, match=r"is not a run of `draft\.train`"):
-        open_run(tmp_path)
+UNREADABLE = "is broken: run.json or members.json cannot be read"
 
 
 @pytest.mark.parametrize(
-    ("file", "text"),
+    ("file", "old", "new", "message"),
     [
-        ("run.json", "{"),
-        ("run.json", "[]"),
-        ("run.json", '{"format": 2, "stage": "base"}'),
-        ("members.json", "[]"),
-        ("members.json", "[{}]"),
-        ("members.json", "\x00"),
+        pytest.param("run.json", None, None, "is not a run of `draft.train`", id="no run"),
+        pytest.param("run.json", None, "{", UNREADABLE, id="no JSON"),
+        pytest.param("run.json", None, "[]", UNREADABLE, id="no record"),
+        pytest.param("run.json", None, '{"format": 2, "stage": "base"}', UNREADABLE, id="few keys"),
+        pytest.param("run.json", '"format": 2', '"format": 99', "another version", id="format"),
+        pytest.param("members.json", None, "[]", UNREADABLE, id="no robots"),
+        pytest.param("members.json", None, "[{}]", UNREADABLE, id="robot without numbers"),
+        pytest.param("members.json", None, "\x00", UNREADABLE, id="binary robots"),
+        pytest.param(
+            "members.json",
+            '"mass": 33',
+            '"mass": 34',
+            "is broken: the robots of members.json are not those of run.json",
+            id="changed by hand",
+        ),
     ],
 )
-def test_a_broken_run_is_explained(tmp_path: Path, file: str, text: str) -> None:
-    run = create(tmp_path / "run", plan(), DESIGNS)
-    (run.folder / file).write_text(text)
-    with pytest.raises(DraftError, match=r"is broken: run\.json or members\.json cannot be read"):
-        open_run(run.folder)
+def test_a_folder_that_is_no_run_as_it_was_written_is_explained(
+    tmp_path: Path, file: str, old: str | None, new: str | None, message: str
+) -> None:
+    folder = create(tmp_path / "run", plan(), DESIGNS).folder
+    text = (folder / file).read_text()
+    if new is None:
+        (folder / file).unlink()
+    else:
+        (folder / file).write_text(new if old is None else text.replace(old, new))
+    with pytest.raises(DraftError) as caught:
+        open_run(folder)
+    assert message in str(caught.value)
 
 
+@pytest.fixture(scope="module")
 def drawn() -> Plan:
     """A plan for designs that differ in numbers only."""
     pytest.importorskip("scipy")
@@ -120,29 +131,24 @@ def drawn() -> Plan:
     return replace(plan(), members=members)
 
 
-def test_a_family_is_stored_as_arrays_beside_one_template(tmp_path: Path) -> None:
-    made = drawn()
-    folder = create(tmp_path / "run", made, {}).folder
+def test_a_family_is_stored_as_arrays_beside_one_template(drawn: Plan, tmp_path: Path) -> None:
+    folder = create(tmp_path / "run", drawn, {}).folder
     assert "<mujoco" not in (folder / "members.json").read_text()
     with np.load(folder / "members.npz") as found:
         assert str(found["template"]).count("<mujoco") == 1
         assert len(found["numbers"]) == 5
-    assert open_run(folder).plan == made
-
-
-def test_a_family_that_an_older_version_stored_as_texts_is_read(tmp_path: Path) -> None:
-    made = drawn()
-    folder = create(tmp_path / "run", made, {}).folder
+    assert open_run(folder).plan == drawn
+    # As an older version stored it.
     (folder / "members.npz").unlink()
-    robots = [member.as_dict() for member in made.members]
+    robots = [member.as_dict() for member in drawn.members]
     (folder / "members.json").write_text(json.dumps(robots))
-    assert open_run(folder).plan == made
+    assert open_run(folder).plan == drawn
 
 
 def test_a_family_whose_texts_differ_in_more_than_numbers_is_stored_as_texts(
-    tmp_path: Path,
+    drawn: Plan, tmp_path: Path
 ) -> None:
-    first, second, *_ = drawn().members
+    first, second, *_ = drawn.members
     odd = replace(second, text=Text(second.xml.replace("<worldbody>", "<worldbody >")))
     made = replace(plan(), members=(first, odd))
     folder = create(tmp_path / "run", made, {}).folder
@@ -151,8 +157,10 @@ def test_a_family_whose_texts_differ_in_more_than_numbers_is_stored_as_texts(
 
 
 @pytest.mark.parametrize("broken", ["missing", "cut", "few rows", "few numbers", "other numbers"])
-def test_a_family_without_its_numbers_is_explained(tmp_path: Path, broken: str) -> None:
-    folder = create(tmp_path / "run", drawn(), {}).folder
+def test_a_family_without_its_numbers_is_explained(
+    drawn: Plan, tmp_path: Path, broken: str
+) -> None:
+    folder = create(tmp_path / "run", drawn, {}).folder
     file = folder / "members.npz"
     content = file.read_bytes()
     with np.load(file) as found:
@@ -165,22 +173,6 @@ def test_a_family_without_its_numbers_is_explained(tmp_path: Path, broken: str) 
         np.savez(file, template=template, numbers=changed[broken])
     with pytest.raises(DraftError, match=r"'.*run' is broken: "):
         open_run(folder)
-
-
-def test_robots_that_were_changed_by_hand_are_noticed(tmp_path: Path) -> None:
-    run = create(tmp_path / "run", plan(), DESIGNS)
-    robots = (run.folder / "members.json").read_text()
-    (run.folder / "members.json").write_text(robots.replace('"mass": 33', '"mass": 34'))
-    with pytest.raises(DraftError, match="are not those of"):
-        open_run(run.folder)
-
-
-def test_another_format_is_explained(tmp_path: Path) -> None:
-    run = create(tmp_path / "run", plan(), DESIGNS)
-    text = (run.folder / "run.json").read_text()
-    (run.folder / "run.json").write_text(text.replace('"format": 2', '"format": 99'))
-    with pytest.raises(DraftError, match="another version of Draft"):
-        open_run(run.folder)
 
 
 def test_a_run_resumes_only_with_the_plan_that_created_it(tmp_path: Path) -> None:

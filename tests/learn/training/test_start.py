@@ -19,14 +19,12 @@ from draft.learn.measuring.policies import commanded, open_source  # noqa: E402
 from draft.learn.policy.policy import FAMILY, Policy, open_policy  # noqa: E402
 from draft.learn.task.recipes import LAPTOP  # noqa: E402
 from draft.learn.training.options import SliceOptions, TrainOptions  # noqa: E402
-from draft.learn.training.ppo.onnx import export  # noqa: E402
 from draft.learn.training.ppo.ppo import action_std  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.warm_start import ALONE  # noqa: E402
 from draft.learn.training.progress import PROGRESS, fastest  # noqa: E402
-from draft.learn.training.run import create  # noqa: E402
 from draft.learn.training.train import prepare  # noqa: E402
-from draft.learn.watching.play import Player  # noqa: E402
+from tests.learn.runs import QUICK, exported, trained  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
 FLAT: dict[str, Any] = {"ground": "flat", "see_ground": False}
@@ -36,29 +34,13 @@ pytestmark = pytest.mark.filterwarnings("ignore::UserWarning:mujoco_warp.*")
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Policy of the cheetah after one iteration, which does not see its design."""
-    made = create(tmp_path_factory.mktemp("start") / "walk", plan(**FLAT), {})
-    trainer = Trainer(made, "cpu")
-    trainer.train(1)
-    trainer.close()
-    player = Player(made, "cpu")
-    path = made.folder / "policy.onnx"
-    export(player, made, path)
-    player.close()
-    return path
+    return exported(trained(tmp_path_factory.mktemp("start") / "walk", plan(**FLAT)))
 
 
 def started(folder: Path, origin: str | Path, **more: Any) -> Trainer:
-    """A trainer that starts from a policy, of stage push."""
-    of = plan(stage="push", **FLAT, **more)
-    return Trainer(learn.begin(folder, of, {}, origin), "cpu")
-
-
-def answers(trainer: Trainer, observations: np.ndarray) -> np.ndarray:
-    """Mean actions of the trainer's actor."""
-    model = learner(trainer).get_policy()
-    with torch.inference_mode():
-        latent = model.obs_normalizer(torch.from_numpy(observations))
-        return model.mlp(latent).numpy()
+    """A trainer that starts from a policy, of stage push on a plane unless stated."""
+    of = plan(**{"stage": "push", **FLAT, **more})
+    return Trainer(learn.begin(folder, of, {}, origin), "cpu", engine=QUICK)
 
 
 def learner(trainer: Trainer) -> Any:
@@ -66,8 +48,12 @@ def learner(trainer: Trainer) -> Any:
 
 
 def agree(trainer: Trainer, policy: Policy) -> None:
+    """Check that the mean actions of the trainer's actor are those of a policy."""
+    model = learner(trainer).get_policy()
     seen = np.random.default_rng(0).normal(size=(20, policy.network.size)).astype(np.float32)
-    np.testing.assert_allclose(answers(trainer, seen), policy(seen), atol=2e-5)
+    with torch.inference_mode():
+        found = model.mlp(model.obs_normalizer(torch.from_numpy(seen))).numpy()
+    np.testing.assert_allclose(found, policy(seen), atol=2e-5)
 
 
 def test_the_actor_is_that_of_the_file_and_its_noise_too(file: Path, tmp_path: Path) -> None:
@@ -122,9 +108,11 @@ def test_values_of_a_critic_that_learns_alone_are_not_clipped(file: Path, tmp_pa
     assert loss(alone=False) > 50.0
 
 
+HIDDEN = {"learning.hidden": LAPTOP.config.learning.hidden}  # Of the family's policy.
+
+
 def test_a_policy_of_the_package_is_named_by_a_word(tmp_path: Path) -> None:
-    values = dict.fromkeys(("learning.hidden",), LAPTOP.config.learning.hidden)
-    trainer = started(tmp_path / "run", "family", values=values | {"learning.mirror": True})
+    trainer = started(tmp_path / "run", "family", values=HIDDEN | {"learning.mirror": True})
     run = learn.open_run(tmp_path / "run")
     assert run.plan.see_design
     assert run.plan.origin is not None
@@ -139,23 +127,19 @@ def test_a_policy_of_the_package_is_named_by_a_word(tmp_path: Path) -> None:
 
 
 def test_a_policy_that_learns_to_climb_keeps_what_it_knows_of_designs(tmp_path: Path) -> None:
-    values = {"learning.hidden": LAPTOP.config.learning.hidden}
-    of = plan(stage="terrain", ground="uneven", see_ground=True, values=values)
-    trainer = Trainer(learn.begin(tmp_path / "run", of, {}, "family"), "cpu")
+    uneven: dict[str, Any] = {"ground": "uneven", "see_ground": True}
+    trainer = started(tmp_path / "run", "family", stage="terrain", values=HIDDEN, **uneven)
     normaliser = learner(trainer).get_policy().obs_normalizer
     # As many samples as an exported policy's count for: one design's own move them little.
     assert int(normaliser.count) == 10_000_000
     assert normaliser.mean.shape[-1] > open_policy(FAMILY).network.size
-    trainer.close()
 
 
 def test_a_run_that_starts_anew_is_known_to_run_as_fast_as_its_policy(tmp_path: Path) -> None:
-    of = {"learning.hidden": (256, 128, 64), "velocity.growth": 0.2}
-    words: dict[str, Any] = {"stage": "velocity", "values": of, **FLAT}
-    run = learn.begin(tmp_path / "run", plan(**words), {}, "family")
-    trainer = Trainer(run, "cpu")
+    of = HIDDEN | {"velocity.growth": 0.2}
+    trainer = started(tmp_path / "run", "family", stage="velocity", values=of)
     trainer.train(1)
-    trainer.close()
+    run = learn.open_run(tmp_path / "run")
     # No robot has restarted yet, and the speed is recorded all the same.
     assert fastest(run.folder / PROGRESS) == pytest.approx(1.0)
     assert commanded(run) == open_source(run.folder).forward == open_policy(FAMILY).forward
@@ -188,26 +172,33 @@ def test_nothing_is_tuned_from_nothing(origin: str | None, tmp_path: Path) -> No
     assert not (tmp_path / "run").exists()
 
 
+OTHER = replace(member(), joints=tuple(f"{name}_" for name in member().joints))
+
+
 @pytest.mark.parametrize(
     ("origin", "change", "message"),
     [
         ("nowhere.onnx", {}, "cannot read nowhere.onnx"),
-        ("{file}", {"words": ["bear"]}, "is of another design than quadruped:bear: "),
+        ("{file}", {"members": (member("bear"),)}, "is of another design than quadruped:bear: "),
         ("{file}", {"see_design": True}, "was trained without `see_design`"),
-        ("{file}", {"values": {"learning.hidden": [8, 8]}}, "`values` learning.hidden=16,16"),
+        (
+            "{file}",
+            {"config": plan(values={"learning.hidden": [8, 8]}).config},
+            "`values` learning.hidden=16,16",
+        ),
         ("{broken}", {}, "is not a policy that Draft can read"),
+        ("family", {"members": (OTHER,)}, "does not drive the joints of"),
     ],
 )
 def test_policies_that_do_not_fit_are_refused(
-    file: Path, tmp_path: Path, origin: str, change: dict, message: str
+    file: Path, tmp_path: Path, origin: str, change: dict[str, Any], message: str
 ) -> None:
     broken = tmp_path / "broken.onnx"
     broken.write_bytes(file.read_bytes()[:2000])
-    words = change.pop("words", [])
-    of = plan(*words, stage="push", **FLAT, **change)
+    of = replace(plan(stage="push", **FLAT), **change)
     name = origin.format(file=file, broken=broken)
     with pytest.raises(DraftError, match=re.escape(message)):
-        Trainer(learn.begin(tmp_path / "run", of, {}, name), "cpu")
+        Trainer(learn.begin(tmp_path / "run", of, {}, name), "cpu", engine=QUICK)
 
 
 def test_a_file_that_changed_since_is_not_taken(file: Path, tmp_path: Path) -> None:
@@ -216,10 +207,4 @@ def test_a_file_that_changed_since_is_not_taken(file: Path, tmp_path: Path) -> N
     run = learn.begin(tmp_path / "run", plan(stage="push", **FLAT), {}, copy)
     copy.write_bytes(FAMILY.read_bytes())
     with pytest.raises(DraftError, match="has changed since"):
-        Trainer(run, "cpu")
-
-
-def test_a_robot_of_other_joints_cannot_start_from_it(file: Path, tmp_path: Path) -> None:
-    other = replace(member(), joints=tuple(f"{name}_" for name in member().joints))
-    with pytest.raises(DraftError, match="does not drive the joints of"):
-        learn.begin(tmp_path / "run", replace(plan(stage="push"), members=(other,)), {}, "family")
+        Trainer(run, "cpu", engine=QUICK)

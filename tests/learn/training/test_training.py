@@ -12,17 +12,15 @@ import pytest
 torch = pytest.importorskip("torch")
 pytest.importorskip("mjlab")
 
-from mjlab.rl import MjlabOnPolicyRunner  # noqa: E402
-
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.engine.machine import devices, obstacle  # noqa: E402
+from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.training.ppo import trainer as trainers  # noqa: E402
-from draft.learn.training.ppo.agent import agent_settings  # noqa: E402
 from draft.learn.training.ppo.checkpoint import read_checkpoint  # noqa: E402
 from draft.learn.training.ppo.log import Table, read  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.progress import fastest, hardest_row  # noqa: E402
-from draft.learn.training.run import Origin, Plan, Run, create, file_digest, open_run  # noqa: E402
+from draft.learn.training.run import Origin, Plan, Run, file_digest, open_run  # noqa: E402
+from tests.learn.runs import QUICK, begin, same, train, weights  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
 missing = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")
@@ -30,33 +28,11 @@ NATIVE = pytest.param("native", marks=missing)
 ENGINES = ["warp", NATIVE]
 
 
-def begin(folder: Path, of: Plan) -> Run:
-    return create(folder, of, {member.name: "values: {}\n" for member in of.members})
-
-
-def train(run: Run, *slices: int, engine: str = "warp") -> Trainer:
-    """Train to each of these iterations, every time as a new process would."""
-    for total in slices:
-        trainer = Trainer(open_run(run.folder), "cpu", engine=engine)
-        assert trainer.train(total)
-        trainer.close()
-    return trainer  # pyright: ignore[reportPossiblyUnboundVariable]
-
-
-def weights(trainer: Trainer) -> dict[str, Any]:
-    state = trainer.runner.alg.save()
-    return state["actor_state_dict"] | {f"v.{k}": v for k, v in state["critic_state_dict"].items()}
-
-
-def same(a: dict[str, Any], b: dict[str, Any]) -> bool:
-    return a.keys() == b.keys() and all(torch.equal(a[k], b[k]) for k in a)
-
-
 @pytest.fixture(scope="module")
 def base(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Trainer]:
     """A base run of three iterations, in one go."""
     run = begin(tmp_path_factory.mktemp("base") / "run", plan())
-    return run, train(run, 3)
+    return run, train(run, 3, engine="warp")
 
 
 @pytest.fixture(scope="module")
@@ -79,27 +55,18 @@ def test_slices_add_up_to_one_long_run_bit_by_bit(long: Any, tmp_path: Path, eng
     sliced = train(begin(tmp_path / "run", plan()), 1, 2, 3, engine=engine)
     assert same(weights(whole), weights(sliced))
     assert torch.equal(whole.env.sim.data.qpos[:], sliced.env.sim.data.qpos[:])
-    names = [row["iteration"] for row in read(tmp_path / "run/progress.csv")]
-    assert names == [1, 2, 3]
+    assert [row["iteration"] for row in read(tmp_path / "run/progress.csv")] == [1, 2, 3]
+
+
+FAMILY = plan("cheetah", "bear", stage="terrain")
+SYMMETRIC = plan(stage="velocity", values={"learning.mirror": True, "velocity.growth": 0.5})
 
 
 @missing
-@pytest.mark.parametrize(
-    ("stage", "words", "values"),
-    [
-        ("terrain", ("cheetah", "bear"), {}),
-        ("velocity", ("cheetah",), {"learning.mirror": True, "velocity.growth": 0.5}),
-    ],
-)
-def test_slices_of_families_on_terrain_and_of_symmetric_networks_add_up_on_native_mujoco(
-    tmp_path: Path, stage: str, words: tuple[str, ...], values: dict[str, Any]
-) -> None:
-    whole, sliced = (
-        train(
-            begin(tmp_path / name, plan(*words, stage=stage, values=values)), *to, engine="native"
-        )
-        for name, to in (("whole", [3]), ("sliced", [1, 3]))
-    )
+@pytest.mark.parametrize("of", [FAMILY, SYMMETRIC], ids=["family on terrain", "symmetric"])
+def test_slices_add_up_on_native_mujoco(tmp_path: Path, of: Plan) -> None:
+    whole = train(begin(tmp_path / "whole", of), 3, engine="native")
+    sliced = train(begin(tmp_path / "sliced", of), 1, 3, engine="native")
     assert same(weights(whole), weights(sliced))
     # In double precision: all that the physics goes on from.
     assert torch.equal(whole.env.sim.state, sliced.env.sim.state)  # type: ignore[attr-defined]
@@ -142,15 +109,16 @@ def test_a_killed_run_resumes_from_its_last_state(
 ) -> None:
     run = begin(tmp_path / "run", plan())
     killed = Trainer(run, "cpu", engine=engine)
-    calls = iter(range(10))
+    save, calls = killed.save, iter(range(10))
 
-    def dies(self: Trainer) -> None:
+    def dies() -> None:
         # After two iterations, of which the second had not been saved.
         if next(calls) == 2:
             raise KeyboardInterrupt
+        save()
 
     monkeypatch.setattr(trainers, "SAVE_SECONDS", 0.0)
-    monkeypatch.setattr(Trainer, "save", _then(dies, Trainer.save))
+    monkeypatch.setattr(killed, "save", dies)
     with pytest.raises(KeyboardInterrupt):
         killed.train(3)
     monkeypatch.undo()
@@ -174,19 +142,11 @@ def test_a_training_that_stops_early_keeps_the_policy_it_reached(
     assert run.policy_line(3) == "policy: iteration 3 of 3"
 
 
-def _then(first: Any, second: Any) -> Any:
-    def both(self: Trainer) -> None:
-        first(self)
-        second(self)
-
-    return both
-
-
 def test_a_resumed_run_keeps_the_state_of_its_curriculum(tmp_path: Path) -> None:
     values = {"velocity.ramp": [[0, 0.4], [1, 0.6], [2, 0.8]]}
     run = begin(tmp_path / "run", plan(stage="velocity", values=values))
     train(run, 2)
-    resumed = Trainer(run, "cpu")
+    resumed = Trainer(run, "cpu", engine=QUICK)
     assert resumed.env.common_step_counter == 2 * 4
     command = resumed.env.command_manager.get_term("twist")
     assert float(command.range_now()[0, 0]) == pytest.approx(0.8 * 15.0)  # type: ignore[attr-defined]
@@ -203,13 +163,18 @@ def test_rows_of_the_terrain_are_part_of_the_state(tmp_path: Path, engine: str) 
     assert again.terrain_levels.tolist() == [2, 1, 0, 2]
 
 
+def after(base: tuple[Run, Trainer], folder: Path, **more: Any) -> Run:
+    """A run of stage push that starts from the base run, or from what is said to be that."""
+    iteration, file = base[0].checkpoint()
+    words = {"run": str(base[0].folder), "iteration": iteration, "digest": file_digest(file)}
+    origin = Origin(**words | more.pop("origin", {}))
+    return begin(folder, replace(plan(stage="push", **more), origin=origin))
+
+
 def test_a_second_stage_starts_from_the_base_policy_alone(
     base: tuple[Run, Trainer], tmp_path: Path
 ) -> None:
-    iteration, file = base[0].checkpoint()
-    origin = Origin(str(base[0].folder), iteration, file_digest(file))
-    run = begin(tmp_path / "run", replace(plan(stage="push"), origin=origin))
-    trainer = Trainer(run, "cpu")
+    trainer = Trainer(after(base, tmp_path / "run"), "cpu", engine=QUICK)
     assert same(weights(trainer), weights(base[1]))
     assert not trainer.runner.alg.optimizer.state
     assert trainer.env.common_step_counter == 0
@@ -219,27 +184,23 @@ def test_a_second_stage_starts_from_the_base_policy_alone(
 def test_a_policy_is_found_beside_a_run_that_was_moved_with_it(
     base: tuple[Run, Trainer], tmp_path: Path
 ) -> None:
-    iteration, file = base[0].checkpoint()
-    origin = Origin("/elsewhere/base", iteration, file_digest(file))
     shutil.copytree(base[0].folder, tmp_path / "base")
-    run = begin(tmp_path / "run", replace(plan(stage="push"), origin=origin))
-    assert same(weights(Trainer(run, "cpu")), weights(base[1]))
+    run = after(base, tmp_path / "run", origin={"run": "/elsewhere/base"})
+    assert same(weights(Trainer(run, "cpu", engine=QUICK)), weights(base[1]))
 
 
-def test_a_policy_that_changed_since_is_not_taken(
-    base: tuple[Run, Trainer], tmp_path: Path
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        pytest.param({"origin": {"digest": "0" * 16}}, "has changed since", id="changed"),
+        pytest.param({"values": {"learning.hidden": [8, 8]}}, "does not fit", id="another size"),
+    ],
+)
+def test_a_policy_that_is_not_the_one_of_the_plan_is_not_taken(
+    base: tuple[Run, Trainer], tmp_path: Path, more: dict[str, Any], words: str
 ) -> None:
-    origin = Origin(str(base[0].folder), 3, "0" * 16)
-    with pytest.raises(DraftError, match="has changed since"):
-        Trainer(begin(tmp_path / "run", replace(plan(stage="push"), origin=origin)), "cpu")
-
-
-def test_a_policy_of_another_size_is_not_taken(base: tuple[Run, Trainer], tmp_path: Path) -> None:
-    iteration, file = base[0].checkpoint()
-    origin = Origin(str(base[0].folder), iteration, file_digest(file))
-    other = plan(stage="push", values={"learning.hidden": [8, 8]})
-    with pytest.raises(DraftError, match="does not fit"):
-        Trainer(begin(tmp_path / "run", replace(other, origin=origin)), "cpu")
+    with pytest.raises(DraftError, match=words):
+        Trainer(after(base, tmp_path / "run", **more), "cpu", engine=QUICK)
 
 
 def test_a_state_of_another_run_is_not_gone_on_with(
@@ -248,7 +209,7 @@ def test_a_state_of_another_run_is_not_gone_on_with(
     run = begin(tmp_path / "run", plan(environments=5))
     run.resume.write_bytes(base[0].resume.read_bytes())
     with pytest.raises(DraftError, match="another environment"):
-        Trainer(run, "cpu")
+        Trainer(run, "cpu", engine=QUICK)
 
 
 def test_a_run_that_lost_its_state_does_not_restart_silently(
@@ -257,28 +218,31 @@ def test_a_run_that_lost_its_state_does_not_restart_silently(
     run = Run(shutil.copytree(base[0].folder, tmp_path / "run"), base[0].plan)
     run.resume.write_bytes(run.resume.read_bytes()[:1000])
     with pytest.raises(DraftError, match="cannot be read as a checkpoint") as caught:
-        Trainer(run, "cpu")
+        Trainer(run, "cpu", engine=QUICK)
     assert "delete the run's folder and train again" in str(caught.value)
     run.resume.unlink()
     with pytest.raises(DraftError, match=r"has checkpoints, but no resume.pt to resume from"):
-        Trainer(run, "cpu")
+        Trainer(run, "cpu", engine=QUICK)
 
 
-@pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04"])
-def test_a_broken_checkpoint_is_explained(tmp_path: Path, content: bytes) -> None:
+class Trap:
+    """What runs code where pickles are trusted."""
+
+    def __reduce__(self) -> Any:
+        return (print, ("code was run",))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"no archive", b"PK\x03\x04", Trap()],
+    ids=["empty", "no archive", "cut", "a trap"],
+)
+def test_a_broken_checkpoint_is_explained_and_runs_no_code(tmp_path: Path, content: Any) -> None:
     file = tmp_path / "model_1.pt"
-    file.write_bytes(content)
-    with pytest.raises(DraftError, match="cannot be read as a checkpoint"):
-        read_checkpoint(file, "cpu")
-
-
-def test_a_checkpoint_cannot_run_code(tmp_path: Path) -> None:
-    class Trap:
-        def __reduce__(self) -> Any:
-            return (print, ("code was run",))
-
-    file = tmp_path / "model_1.pt"
-    torch.save({"a": Trap()}, file)
+    if isinstance(content, bytes):
+        file.write_bytes(content)
+    else:
+        torch.save({"a": content}, file)
     with pytest.raises(DraftError, match="cannot be read as a checkpoint"):
         read_checkpoint(file, "cpu")
 
@@ -303,16 +267,6 @@ def test_numbers_that_are_none_stop_training_and_leave_the_last_state(
         trainer.train(3)
     after = {p.name: p.read_bytes() for p in run.folder.iterdir() if p.is_file()}
     assert after == before
-
-
-def test_mjlab_itself_reads_a_checkpoint(base: tuple[Run, Trainer]) -> None:
-    trainer = base[1]
-    numbers = agent_settings(trainer._run.plan.config, "base", seed=5)
-    runner = MjlabOnPolicyRunner(trainer._wrapped, numbers, None, "cpu")
-    runner.load(str(base[0].checkpoint()[1]))
-    state = runner.alg.get_policy().state_dict()
-    assert same(state, trainer.runner.alg.get_policy().state_dict())
-    assert runner.current_learning_iteration == 3
 
 
 def test_progress_has_rewards_by_term(base: tuple[Run, Trainer]) -> None:
@@ -342,45 +296,11 @@ def test_a_new_name_adds_a_column_to_the_table(tmp_path: Path) -> None:
     assert file.read_text() == ("iteration,reward,curriculum/row\n1,0.5,nan\n2,0.6,2\n3,0.7,nan\n")
 
 
-def test_the_hardest_row_of_stairs_up_to_an_iteration_is_known(tmp_path: Path) -> None:
+def test_what_a_training_had_reached_by_an_iteration_is_known(tmp_path: Path) -> None:
     file = tmp_path / "progress.csv"
     assert hardest_row(file, 5) is None
-    file.write_text("iteration,stairs/hardest_row\n1,nan\n2,3\n3,2\n4,7\n")
+    rows = ("1,nan,0.9", "2,3,nan", "3,2,1.3", "4,7,nan")
+    file.write_text("\n".join(("iteration,stairs/hardest_row,curriculum/fastest", *rows, "")))
     assert [hardest_row(file, i) for i in (1, 2, 3, 4)] == [None, 3.0, 3.0, 7.0]
-
-
-def test_the_fastest_commanded_speed_at_an_iteration_is_known(tmp_path: Path) -> None:
-    file = tmp_path / "progress.csv"
-    file.write_text("iteration,curriculum/fastest\n1,0.9\n2,nan\n3,1.3\n")
     assert [fastest(file, i) for i in (0, 1, 2)] == [None, 0.9, 0.9]
     assert fastest(file) == 1.3
-
-
-@pytest.mark.parametrize(
-    ("word", "words"),
-    [
-        ("cuda", "PyTorch finds no GPU"),
-        ("0,1", "PyTorch finds no GPU"),
-        ("all", "PyTorch finds no GPU"),
-        ("tpu", "there is no device 'tpu'"),
-        ("cuda:x", "there is no device"),
-    ],
-)
-def test_a_device_that_is_not_there_is_explained(
-    word: str, words: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    with pytest.raises(DraftError, match=words):
-        devices(word)
-    assert devices("auto") == ["cpu"]
-
-
-def test_gpus_are_named_by_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
-    monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
-    assert devices("auto") == devices("cuda") == devices("cuda:0") == ["cuda:0"]
-    assert devices("all") == devices("0,1") == ["cuda:0", "cuda:1"]
-    assert devices("cuda:1") == ["cuda:1"]
-    assert devices("cpu") == ["cpu"]
-    with pytest.raises(DraftError, match="this machine has 2 GPUs"):
-        devices("cuda:2")

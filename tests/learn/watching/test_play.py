@@ -60,14 +60,12 @@ def hold(player: Player) -> None:
     player.policy = lambda seen: torch.zeros(player.env.num_envs, 12)
 
 
-def test_the_last_checkpoint_and_the_first_design_are_shown(player: Player) -> None:
+def test_the_last_checkpoint_of_the_first_design_is_shown_and_acts_by_its_mean(
+    player: Player,
+) -> None:
     assert player.iteration == 2
     assert player.member.name == "quadruped:cheetah"
     assert isinstance(player.env, RslRlVecEnvWrapper)
-
-
-def test_the_policy_acts_by_its_mean(player: Player) -> None:
-    player.load(2)
     seen = player.env.get_observations()
     with torch.inference_mode():
         assert torch.equal(player.policy(seen), player.policy(seen))
@@ -85,9 +83,8 @@ def test_the_command_stays_after_falls_and_in_time(player: Player) -> None:
 
 def test_nothing_is_noisy_and_nothing_pushes(player: Player) -> None:
     env = player.env.unwrapped
-    assert torch.equal(
-        env.observation_manager.compute()["actor"], env.observation_manager.compute()["actor"]
-    )
+    first, second = (env.observation_manager.compute()["actor"] for _ in range(2))
+    assert torch.equal(first, second)
     assert "push" not in str(env.event_manager.active_terms)
 
 
@@ -146,18 +143,21 @@ def test_a_member_is_shown_with_its_own_body(run: Run) -> None:
     player.close()
 
 
-def test_a_policy_of_other_sizes_is_reported(run: Run, tmp_path: Path) -> None:
-    other = create(tmp_path / "run", plan(values={"learning.hidden": [8, 8]}), {})
-    (other.folder / "model_2.pt").write_bytes(run.checkpoint()[1].read_bytes())
-    with pytest.raises(DraftError, match="does not fit the run's design and numbers"):
-        Player(other, "cpu", ground="flat")
-
-
-def test_a_broken_checkpoint_is_reported(run: Run, tmp_path: Path) -> None:
-    other = create(tmp_path / "run", plan(), {})
+@pytest.mark.parametrize(
+    ("values", "share", "words"),
+    [
+        ({"learning.hidden": [8, 8]}, 1.0, "does not fit the run's design and numbers"),
+        ({}, 0.5, r"model_2\.pt cannot be read as a checkpoint"),
+    ],
+    ids=["of other sizes", "cut short"],
+)
+def test_a_checkpoint_that_does_not_fit_is_reported(
+    run: Run, tmp_path: Path, values: dict[str, Any], share: float, words: str
+) -> None:
+    other = create(tmp_path / "run", plan(values=values), {})
     data = run.checkpoint()[1].read_bytes()
-    (other.folder / "model_2.pt").write_bytes(data[: len(data) // 2])
-    with pytest.raises(DraftError, match=r"model_2\.pt cannot be read as a checkpoint"):
+    (other.folder / "model_2.pt").write_bytes(data[: int(share * len(data))])
+    with pytest.raises(DraftError, match=words):
         Player(other, "cpu", ground="flat")
 
 
@@ -173,30 +173,27 @@ def camera(player: Player) -> Iterator[Any]:
     made.close()
 
 
-def test_the_robot_is_in_the_middle_of_the_picture(player: Player, camera: Any) -> None:
+def trunk(pixels: Any) -> Any:
+    """Where the trunk is: it is blue, and the ground is grey."""
+    return pixels[..., 2].astype(int) - pixels[..., 0] > 40
+
+
+def test_the_robot_is_in_the_middle_of_the_picture_and_stays_there(
+    player: Player, camera: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     player.env.reset()
-    pixels = camera.frame(0.04).astype(int)
-    assert pixels.shape == (90, 160, 3)
-    # The trunk is blue; the ground is grey.
-    blue = pixels[..., 2] - pixels[..., 0] > 40
+    blue = trunk(camera.frame(0.04))
+    assert blue.shape == (90, 160)
     rows, columns = np.nonzero(blue)
     assert blue.sum() > 100
     assert abs(np.median(columns) - 80) < 20
     assert abs(np.median(rows) - 45) < 20
-
-
-def test_a_fast_robot_stays_in_the_middle_of_the_picture(
-    player: Player, camera: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    player.env.reset()
-    camera.frame(0.04)
     with monkeypatch.context() as patch:
         patch.setattr(camera, "_draw", lambda: np.zeros(1))  # Only the last frame is looked at.
         for _ in range(75):
             player.env.unwrapped.sim.data.qpos[0, 0] += 5.0 * 0.04
             camera.frame(0.04)
-    pixels = camera.frame(0.0).astype(int)
-    _, columns = np.nonzero(pixels[..., 2] - pixels[..., 0] > 40)
+    _, columns = np.nonzero(trunk(camera.frame(0.0)))
     assert abs(np.median(columns) - 80) < 20
 
 
@@ -217,11 +214,11 @@ def test_a_video_and_a_strip_are_written_whole(
     assert (meta["size"], meta["fps"]) == ((160, 90), 25.0)
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["a.mp4"]
     with Image.open(tmp_path / "a.png") as strip:
-        pixels = np.asarray(strip.convert("RGB")).astype(int)
+        pixels = np.asarray(strip.convert("RGB"))
     # Three windows, cut to the robot with its blue trunk.
     windows = np.split(pixels[: -strips.BAND, : pixels.shape[1] // 3 * 3], 3, axis=1)
     for window in windows:
-        blue = window[..., 2] - window[..., 0] > 40
+        blue = trunk(window)
         assert blue.mean() > 0.06
         assert blue.size < 0.35 * 160 * 90
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,20 @@ def collected(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("results") / "three"
     collect(source, out)
     return out
+
+
+@pytest.fixture(scope="session")
+def _one(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from tests.learn import synthetic
+
+    folder = tmp_path_factory.mktemp("one") / "study"
+    return synthetic.study(folder, ("cheetah",), (0,), ("nominal",), ("velocity",))
+
+
+@pytest.fixture
+def one(_one: Path, tmp_path: Path) -> Path:
+    """A study of one policy, with one evaluation, which a test may change."""
+    return Path(shutil.copytree(_one, tmp_path / "study"))
 
 
 @pytest.fixture(autouse=True)

@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from draft.study.report.blocks import Page
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.html import html
 from draft.study.report.occupancy import Utilisation
 from draft.study.report.sections import Contents
 from draft.study.report.table import Table
 from draft.study.report.tables import all_tables
 
-BASE_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("base",)}
-SPEED_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("velocity",)}
-
 
 def tables_of(folder: Path) -> dict[str, Table]:
-    study = gather(folder)
+    study = read(folder)
     return all_tables(study, Utilisation(study))
 
 
 def page_of(folder: Path) -> str:
     """The page without figures."""
-    study = gather(folder)
+    study = read(folder)
     used = Utilisation(study)
     return html(Contents(study, all_tables(study, used), {}).page())
 

@@ -21,7 +21,7 @@ from draft.study.report.blocks import (
     Pictures,
     Section,
 )
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.html import html
 from draft.study.report.markdown import markdown
 from draft.study.report.occupancy import Utilisation
@@ -31,7 +31,7 @@ from draft.study.report.tables import all_tables
 
 
 def test_html_and_markdown_have_the_same_sections_and_tables(source: Path, tmp_path: Path) -> None:
-    study = gather(source)
+    study = read(source)
     used = Utilisation(study)
     page = Contents(study, all_tables(study, used), {}).page()
     said, marked = html(page), markdown(page, tmp_path)

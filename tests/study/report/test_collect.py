@@ -13,11 +13,9 @@ import pytest
 pytest.importorskip("pyarrow")
 
 from draft.errors import DraftError
-from draft.study.report import collected as files
+from draft.study.report import folder as files
 from draft.study.report.collect import collect
-from draft.study.report.gather import gather
 from draft.study.report.occupancy import Utilisation
-from draft.study.report.records import Samples
 from draft.study.report.table import to_csv
 from draft.study.report.tables import all_tables
 from tests.learn import synthetic
@@ -41,7 +39,7 @@ def test_scalars_are_those_of_the_summaries(source: Path, collected: Path) -> No
         (path.parts[-4], path.parts[-2]): json.loads(path.read_text())["scalars"] for path in paths
     }
     kept = {(one.run.name, one.name): one.summary.scalars for one in
-            files.read(collected).evaluations}  # fmt: skip
+            files.read(collected, results=True).evaluations}  # fmt: skip
     assert len(told) == 72
     assert kept == told
 
@@ -52,21 +50,21 @@ def test_every_table_of_the_report_is_the_same_from_collected_results(
     def csv(study: Any) -> dict[str, str]:
         return {name: to_csv(t) for name, t in all_tables(study, Utilisation(study)).items()}
 
-    assert csv(files.read(collected)) == csv(gather(source))
+    assert csv(files.read(collected, results=True)) == csv(files.read(source))
 
 
 def test_counted_samples_and_training_curves_are_the_same(source: Path, collected: Path) -> None:
     one, other = (
         next(e for e in study.of("quadruped:bear", "nominal") if e.run.name == "bear-push-1")
-        for study in (gather(source), files.read(collected))
+        for study in (files.read(source), files.read(collected, results=True))
     )
-    assert [dict(row) for row in one.run.rows] == [dict(row) for row in other.run.rows]
-    assert 20 < len(other.run.rows) <= 50
+    assert one.run.curve == other.run.curve
+    assert 20 < len(other.run.curve["iteration"]) <= 50
     ours, theirs = one.samples["push"], other.samples["push"]
     assert list(ours.plane) == list(theirs.plane) == ["hip roll", "hip pitch", "knee"]
     for joint in ours.plane:
         np.testing.assert_array_equal(ours.plane[joint], theirs.plane[joint])
-        np.testing.assert_array_equal(ours.counts[joint, "sum"], theirs.counts[joint, "sum"])
+        np.testing.assert_array_equal(ours.bins[joint]["sum"], theirs.bins[joint]["sum"])
 
 
 def test_evaluations_of_an_older_draft_are_read_by_their_older_words(tmp_path: Path) -> None:
@@ -82,29 +80,18 @@ def test_evaluations_of_an_older_draft_are_read_by_their_older_words(tmp_path: P
         words = ["battery" if name == "test" else name for name in table.column_names]
         assert "battery" in words
         parquet.write_table(table.rename_columns(words), path)
-    (ours, *_), (theirs, *_) = gather(new).evaluations, gather(old).evaluations
+    (ours, *_), (theirs, *_) = files.read(new).evaluations, files.read(old).evaluations
     assert ours.summary.tests.keys() == {"speed"}
     assert theirs.summary == ours.summary
     np.testing.assert_equal(theirs.samples["speed"].plane, ours.samples["speed"].plane)
-    np.testing.assert_equal(theirs.samples["speed"].counts, ours.samples["speed"].counts)
-    assert files.texts(gather(old))[RUN] == files.texts(gather(new))[RUN]
-
-
-def test_collecting_again_changes_no_byte(source: Path, tmp_path: Path) -> None:
-    out = tmp_path / "three"
-    first = collect(source, out)
-    before = contents(out)
-    again = collect(source, out)
-    assert first.written
-    assert not again.written
-    assert (again.new, again.changed) == ((), ())
-    assert contents(out) == before
+    np.testing.assert_equal(theirs.samples["speed"].bins, ours.samples["speed"].bins)
+    assert files.texts(files.read(old))[RUN] == files.texts(files.read(new))[RUN]
 
 
 @pytest.mark.parametrize("name", ["three_quadrupeds", "paper"])
 def test_results_in_the_repository_are_written_as_they_are_read(name: str) -> None:
     folder = Path(__file__).parents[3] / "examples/results" / name
-    written = files.texts(files.read(folder))
+    written = files.texts(files.read(folder, results=True))
     assert len(written) > 10
     assert written == {path: (folder / path).read_text(encoding="utf-8") for path in written}
 
@@ -118,13 +105,14 @@ def test_three_seeds_take_less_than_three_megabytes(collected: Path) -> None:
 
 def test_samples_are_small_even_if_all_that_torque_and_speed_can_be_is_met(tmp_path: Path) -> None:
     """36 runs stay below 3 MB with five digits in every bin and cell."""
-    (one,) = gather(synthetic.study(tmp_path, arms=("nominal",), **SMALL)).evaluations
+    (one,) = files.read(synthetic.study(tmp_path, arms=("nominal",), **SMALL)).evaluations
     samples = one.samples["speed"]
-    full = Samples(
-        {key: counts + 10_000 for key, counts in samples.counts.items()},
-        {joint: cells + 10_000 for joint, cells in samples.plane.items()},
-    )
-    told = files.SamplesFile.of(full).model_dump()
+    for counts in [
+        *samples.plane.values(),
+        *(x for y in samples.bins.values() for x in y.values()),
+    ]:
+        np.add(counts, 10_000, out=counts)
+    told = samples.model_dump()
     records = 3 * 3 * 5  # designs, seeds, tests
     assert 1e6 < records * len(files.dumps(told)) < 2.6e6
 
@@ -146,8 +134,14 @@ def test_what_comes_in_later_is_added(source: Path, tmp_path: Path) -> None:
     assert len(second.new) == 13
     assert second.changed == ("bear-push-1",)
     assert second.missing == ()
-    collect(source, tmp_path / "at_once")
-    assert contents(out) == contents(tmp_path / "at_once")
+    at_once = tmp_path / "at_once"
+    assert collect(source, at_once).written
+    before = contents(at_once)
+    assert contents(out) == before
+    # Collecting again changes no byte.
+    again = collect(source, at_once)
+    assert (again.written, again.new, again.changed) == (False, (), ())
+    assert contents(at_once) == before
 
 
 def test_parts_of_a_study_from_two_machines_go_together(tmp_path: Path) -> None:
@@ -157,7 +151,7 @@ def test_parts_of_a_study_from_two_machines_go_together(tmp_path: Path) -> None:
         synthetic.study(here, ("cheetah",), (seed,), stages=("base",))
         plan_of(here, seeds=[seed], stages=["base"])
         collect(here, out)
-    study = files.read(out)
+    study = files.read(out, results=True)
     assert study.seeds == [3, 4]
     assert study.planned
     assert study.planned.seeds == (3, 4)
@@ -176,15 +170,6 @@ def test_an_evaluation_that_is_done_again_stays_until_it_is_replaced(tmp_path: P
     summary = place / "summary.json"
     summary.write_text(summary.read_text().replace('"replicas": 256', '"replicas": 64'))
     assert collect(folder, out).changed == ("cheetah-velocity-0",)
-
-
-def test_an_evaluation_of_another_checkpoint_is_omitted(tmp_path: Path) -> None:
-    run = synthetic.trained(tmp_path, "cheetah", "push", 0)
-    synthetic.evaluated(run, change=lambda summary: summary.update(iteration=700))
-    done = collect(tmp_path, tmp_path / "out")
-    words = "cheetah-push-0, nominal-walking: the evaluation is of iteration 700, not 1500"
-    assert words in done.omitted
-    assert done.study.evaluations == ()
 
 
 def test_a_run_of_another_plan_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
@@ -225,13 +210,6 @@ def test_another_robot_of_the_same_name_is_refused(tmp_path: Path) -> None:
         collect(other, out)
 
 
-def test_a_folder_of_something_else_is_kept(source: Path, tmp_path: Path) -> None:
-    (tmp_path / "letter.txt").write_text("dear")
-    with pytest.raises(DraftError, match="does not hold results of a study; it is kept"):
-        collect(source, tmp_path)
-    assert contents(tmp_path) == {"letter.txt": b"dear"}
-
-
 def test_strips_beside_the_results_stay(tmp_path: Path) -> None:
     folder = synthetic.study(tmp_path / "study", **SMALL)
     out = tmp_path / "out"
@@ -244,13 +222,18 @@ def test_strips_beside_the_results_stay(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"study", "out"}
 
 
-def test_families_are_omitted(tmp_path: Path) -> None:
-    synthetic.study(tmp_path / "s", **SMALL)
-    synthetic.family(tmp_path / "s", lambda thigh, ratio: 2.0)
-    done = collect(tmp_path / "s", tmp_path / "out")
-    words = "family-velocity-0 is of a family; only single designs are collected"
-    assert words in done.omitted
-    assert [one.name for one in done.study.singles] == ["cheetah-velocity-0"]
+def test_families_and_evaluations_of_another_checkpoint_are_omitted(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "s", **SMALL)
+    synthetic.family(folder, lambda thigh, ratio: 2.0)
+    run = synthetic.trained(folder, "cheetah", "push", 0)
+    synthetic.evaluated(run, change=lambda summary: summary.update(iteration=700))
+    done = collect(folder, tmp_path / "out")
+    assert set(done.omitted) == {
+        "family-velocity-0 is of a family; only single designs are collected",
+        "cheetah-push-0, nominal-walking: the evaluation is of iteration 700, not 1500",
+    }
+    assert {one.name for one in done.study.singles} == {"cheetah-velocity-0", "cheetah-push-0"}
+    assert {one.run.name for one in done.study.evaluations} == {"cheetah-velocity-0"}
 
 
 def test_a_study_without_a_finished_run_is_explained(tmp_path: Path) -> None:
@@ -287,7 +270,7 @@ def test_a_broken_file_is_named(tmp_path: Path, file: str, change: Any, words: s
     path = out / file
     path.write_text(change(path.read_text()))
     with pytest.raises(DraftError) as refused:
-        files.read(out)
+        files.read(out, results=True)
     said = str(refused.value)
     assert words in said
     assert "cannot be read as results" in said
@@ -295,15 +278,16 @@ def test_a_broken_file_is_named(tmp_path: Path, file: str, change: Any, words: s
         collect(source, out)
 
 
-def test_a_studys_own_folder_is_not_taken_for_results(source: Path) -> None:
+def test_folders_without_results_are_explained_and_kept(source: Path, tmp_path: Path) -> None:
     with pytest.raises(DraftError) as refused:
-        files.read(source)
+        files.read(source, results=True)
     said = str(refused.value)
     assert "is the folder of a study, whose results are not collected yet" in said
-    assert f"draft study collect {source} --out DIR" in said
+    assert f'`draft.study.collect("{source}", out="DIR")`' in said
     assert "delete" not in said
-
-
-def test_a_folder_without_results_is_explained(tmp_path: Path) -> None:
     with pytest.raises(DraftError, match="holds no results of a study"):
-        files.read(tmp_path)
+        files.read(tmp_path, results=True)
+    (tmp_path / "letter.txt").write_text("dear")
+    with pytest.raises(DraftError, match="does not hold results of a study; it is kept"):
+        collect(source, tmp_path)
+    assert contents(tmp_path) == {"letter.txt": b"dear"}

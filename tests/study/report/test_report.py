@@ -23,16 +23,16 @@ from matplotlib import pyplot as plt
 
 from draft.study.report import robots, tables, writing
 from draft.study.report.curves import PANELS, over_level, over_speed
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.labels import label_drops
-from draft.study.report.records import Study
 from draft.study.report.run_tables import remarks
 from draft.study.report.spread import Spread, Values
 from draft.study.report.table import Table, to_csv, to_tex
 from tests.learn import synthetic
-from tests.study.report.pages import BASE_ONLY, SPEED_ONLY, page_of, tables_of, to_html
+from tests.study.report.pages import page_of, tables_of, to_html
 
 KINDS = writing.KINDS
+SUMMARY = '{"format": 2, "arm": "nominal", "protocol": "walking"'
 
 
 def cells(table: Table, *start: str) -> dict[str, dict[str, str]]:
@@ -61,31 +61,34 @@ class Links(HTMLParser):
         self.said += "" if self._open and self._open[-1] == "style" else data
 
 
-def test_the_report_is_written_whole_with_its_figures_and_tables(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_report_is_written_whole_with_its_figures_and_tables_and_again_the_same(
+    one: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(writing, "KINDS", KINDS)
-    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
-    page = writing.write(folder)
-    assert page == folder.resolve() / "report" / "index.html"
-    kinds = {path.suffix for path in (page.parent / "figures").iterdir()}
-    assert kinds == {".png", ".pdf", ".svg"}
-    names = {path.stem for path in (page.parent / "figures").iterdir()}
+    page = writing.write(one)
+    assert page == one.resolve() / "report" / "index.html"
+    figures = list((page.parent / "figures").iterdir())
+    assert {path.suffix for path in figures} == {".png", ".pdf", ".svg"}
+    names = {path.stem for path in figures}
     assert {"capability", "curve_speed", "curve_survival", "curve_efficiency", "robots"} <= names
     assert {"training_velocity_reward", "occupancy_speed_cheetah"} <= names
     assert {path.suffix for path in (page.parent / "tables").iterdir()} == {".csv", ".tex"}
-    assert {path.name for path in folder.iterdir()} == {"runs", "report"}
+    assert {path.name for path in one.iterdir()} == {"runs", "report"}
     text = page.read_text(encoding="utf-8")
     assert not any(word in Links(text).said for word in ("NaN", "nan", "None", "inf "))
     outside = [link for link in Links(text).found if not link.startswith(("data:", "#"))]
     assert outside == []
     assert "url(" not in text.partition("<body>")[0]
+    first, second = page.parent, writing.write(one, tmp_path / "again").parent
+    files = sorted(path.relative_to(first) for path in first.rglob("*") if path.is_file())
+    assert len(files) > 15
+    assert [f for f in files if (first / f).read_bytes() != (second / f).read_bytes()] == []
 
 
 def test_the_least_cost_of_transport_is_the_best_and_the_longest_range(
     source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = gather(source)
+    study = read(source)
     numbers = dict(zip(study.members, (2.0, 1.0, 3.0), strict=True))
     monkeypatch.setattr(tables, "by_seed", lambda _, name, *__: Values({0: numbers[name]}, {}))
     table = tables.capability(study, "energy")
@@ -94,17 +97,6 @@ def test_the_least_cost_of_transport_is_the_best_and_the_longest_range(
     for title, best in (("cost of transport", 1.0), ("range", 3.0)):
         own = [cast("Spread", row[heads.index(title)]) for row in table.rows]
         assert {spread.median for spread in own if spread.best} == {best}
-
-
-def test_the_same_study_gives_the_same_bytes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(writing, "KINDS", KINDS)
-    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **BASE_ONLY)
-    first, second = (writing.write(folder, tmp_path / name).parent for name in ("a", "b"))
-    files = sorted(path.relative_to(first) for path in first.rglob("*") if path.is_file())
-    assert len(files) > 15
-    assert [f for f in files if (first / f).read_bytes() != (second / f).read_bytes()] == []
 
 
 def test_medians_and_bands_are_those_of_the_seeds(source: Path) -> None:
@@ -116,7 +108,7 @@ def test_medians_and_bands_are_those_of_the_seeds(source: Path) -> None:
             expected = [statistics.median(own), min(own), max(own)]
             said = [float(row[key]) for key in (scalar, f"{scalar}, least", f"{scalar}, greatest")]
             assert said == pytest.approx(expected, rel=1e-5)
-    assert list(rows) == ["cheetah", "bear", "giraffe"]
+    assert list(rows) == ["cheetah", "bear", "giraffe"]  # by leg length
 
 
 def test_the_capability_table_has_the_masses_and_marks_the_best_of_an_arm(source: Path) -> None:
@@ -141,11 +133,6 @@ def test_the_capability_table_has_the_masses_and_marks_the_best_of_an_arm(source
     assert rf"\textbf{{{shown}}} (" in to_tex(table)
 
 
-def test_a_design_alone_is_not_called_the_best(tmp_path: Path) -> None:
-    folder = synthetic.study(tmp_path / "study", designs=("cheetah",), seeds=(0, 1))
-    assert "<b>" not in to_html(tables_of(folder)["capability"])
-
-
 def test_a_hand_made_study_of_three_seeds_reads_as_it_should(tmp_path: Path) -> None:
     for seed, speed in enumerate((3.0, 3.6, 3.1)):
         run = synthetic.trained(tmp_path, "cheetah", "velocity", seed)
@@ -163,7 +150,7 @@ def test_normalised_speed_is_per_root_of_g_and_leg_length(source: Path) -> None:
 
 
 def test_curves_are_medians_over_seeds_level_by_level(source: Path) -> None:
-    study = gather(source)
+    study = read(source)
     x, middle, low, high = over_level(study, "quadruped:bear", "perturbed", PANELS["push"])
     assert x.tolist() == synthetic.KICKS
     evaluations = list(study.of("quadruped:bear", "perturbed"))
@@ -176,7 +163,7 @@ def test_curves_are_medians_over_seeds_level_by_level(source: Path) -> None:
 
 
 def test_stairs_are_pooled_as_the_mean_of_up_and_down(source: Path) -> None:
-    one = next(e for e in gather(source).evaluations if "ascent" in e.summary.tests)
+    one = next(e for e in read(source).evaluations if "ascent" in e.summary.tests)
     up, down = (one.summary.tests[name].get("traversed", []) for name in ("ascent", "descent"))
     assert list(PANELS["stairs"].points(one.summary).values()) == [
         (a + b) / 2 for a, b in zip(up, down, strict=True)
@@ -184,15 +171,17 @@ def test_stairs_are_pooled_as_the_mean_of_up_and_down(source: Path) -> None:
 
 
 def test_efficiency_is_drawn_to_the_peak_command(source: Path) -> None:
-    speeds, *_ = over_speed(gather(source), "quadruped:cheetah", "nominal")
+    speeds, *_ = over_speed(read(source), "quadruped:cheetah", "nominal")
     assert len(speeds) == sum(level <= 5.0 for level in synthetic.SPEED)
 
 
-def test_one_seed_has_no_band_and_no_variation(tmp_path: Path) -> None:
+def test_a_design_alone_has_no_best_and_one_seed_no_band(tmp_path: Path) -> None:
     folder = synthetic.study(tmp_path / "study", designs=("cheetah",), seeds=(0,))
     tables = tables_of(folder)
     assert "seed_variation" not in tables
-    assert "–" not in re.sub(r"<thead>.*?</thead>", "", to_html(tables["capability"]))
+    shown = to_html(tables["capability"])
+    assert "<b>" not in shown
+    assert "–" not in re.sub(r"<thead>.*?</thead>", "", shown)
     assert "There is one seed" in page_of(folder)
 
 
@@ -229,77 +218,66 @@ def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) 
         ("{", "Invalid JSON"),
         ("[]", "not a summary of this version"),
         ('{"format": 9}', "not a summary of this version"),
-        (
-            '{"format": 2, "arm": "odd", "protocol": "walking"}',
-            "arm: Input should be",
-        ),
-        (
-            '{"format": 2, "arm": "nominal", "protocol": "walking", "scalars": {"kick": NaN}}',
-            "finite",
-        ),
-        (
-            '{"format": 2, "arm": "nominal", "protocol": "walking", '
-            '"tests": {"speed": {"levels": [1, 2], "survival": [1, 1], "eta": [1, 1], '
-            '"speed": [1]}}}',
-            "not have one value for each level",
-        ),
-        (
-            '{"format": 2, "arm": "nominal", "protocol": "walking", '
-            '"utilisation": {"speed": {"knee": 1}}}',
-            "utilisation.speed.knee: Input should be an object",
-        ),
-        (
-            '{"format": 2, "arm": "nominal", "protocol": "walking", "took_s": "long"}',
-            "took_s: Input should be a valid number",
-        ),
-        (
-            '{"format": 2, "arm": "nominal", "protocol": "walking", "by_member": {"a": 1}}',
-            "by_member.a: Input should be an object",
+        *(
+            (f"{SUMMARY}, {text}}}", words)
+            for text, words in (
+                ('"arm": "odd"', "arm: Input should be"),
+                ('"errors": "mine"', "errors: Input should be 'twins', 'survey' or 'paper'"),
+                ('"scalars": {"kick": NaN}', "finite"),
+                (
+                    '"tests": {"speed": {"levels": [1, 2], "survival": [1, 1], "eta": [1, 1], '
+                    '"speed": [1]}}',
+                    "not have one value for each level",
+                ),
+                (
+                    '"utilisation": {"speed": {"knee": 1}}',
+                    "utilisation.speed.knee: Input should be an object",
+                ),
+                ('"took_s": "long"', "took_s: Input should be a valid number"),
+                ('"by_member": {"a": 1}', "by_member.a: Input should be an object"),
+            )
         ),
     ],
 )
-def test_a_broken_summary_is_named_and_omitted(tmp_path: Path, text: str, words: str) -> None:
-    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
-    path = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking/summary.json"
+def test_a_broken_summary_is_named_and_omitted(one: Path, text: str, words: str) -> None:
+    path = one / "runs/cheetah-velocity-0/evaluation/nominal-walking/summary.json"
     path.write_text(text)
-    (warning,) = gather(folder).warnings
+    (warning,) = read(one).warnings
     assert "cheetah-velocity-0/evaluation/nominal-walking/summary.json cannot be read" in warning
     assert words in warning
-    assert "Omitted from this report" in page_of(folder)
+    assert "Omitted from this report" in page_of(one)
 
 
-def test_a_broken_run_is_named_and_omitted(tmp_path: Path) -> None:
-    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
-    bad = synthetic.trained(folder, "bear", "base", 0)
+def test_a_broken_run_is_named_and_omitted_and_what_a_killed_process_left_is_none(
+    one: Path,
+) -> None:
+    runs = one / "runs"
+    shutil.copytree(runs / "cheetah-velocity-0", runs / ".cheetah-velocity-0-abcdefgh")
+    found = read(one)
+    assert [run.name for run in found.singles] == ["cheetah-velocity-0"]
+    assert found.warnings == ()
+    bad = synthetic.trained(one, "bear", "base", 0)
     (bad.folder / "run.json").write_text("{")
-    study = gather(folder)
+    study = read(one)
     assert list(study.titles.values()) == ["cheetah"]
     assert "bear-base-0' is broken" in study.warnings[0]
 
 
-def test_what_a_killed_process_left_of_making_a_run_is_no_run(tmp_path: Path) -> None:
-    synthetic.study(tmp_path, ("cheetah",), (0,), stages=("base",))
-    runs = tmp_path / "runs"
-    shutil.copytree(runs / "cheetah-base-0", runs / ".cheetah-base-0-abcdefgh")
-    found = gather(tmp_path)
-    assert [one.name for one in found.singles] == ["cheetah-base-0"]
-    assert found.warnings == ()
-
-
 def test_flags_are_reported_once_with_their_designs_arms_and_seeds(source: Path) -> None:
-    said = [words for words in remarks(gather(source)) if "velocity" in words and "bear" in words]
+    said = [words for words in remarks(read(source)) if "velocity" in words and "bear" in words]
     assert len(said) == 1
     assert "velocity, nominal and perturbed inertia, seeds 0, 1, 2: 7 m/s" in said[0]
 
 
 def test_both_protocols_stand_side_by_side(tmp_path: Path) -> None:
     both = ("walking", "published")
-    folder = synthetic.study(tmp_path / "s", arms=("nominal",), protocols=both, **SPEED_ONLY)
+    one = (("cheetah",), (0,), ("nominal",), ("velocity",))
+    folder = synthetic.study(tmp_path / "s", *one, protocols=both)
     assert [row[1] for row in tables_of(folder)["protocols"].rows] == list(both)
 
 
-def test_words_of_designs_do_not_become_markup(source: Path, tmp_path: Path) -> None:
-    folder = synthetic.study(tmp_path / "a<b>&_50%", arms=("nominal",), **SPEED_ONLY)
+def test_words_of_designs_do_not_become_markup(one: Path, tmp_path: Path) -> None:
+    folder = one.rename(tmp_path / "a<b>&_50%")
     assert "<h1>Study: a&lt;b&gt;&amp;_50%</h1>" in page_of(folder)
 
 
@@ -319,53 +297,42 @@ def test_latex_is_balanced_and_escaped(source: Path) -> None:
         assert counts == {len(kinds[1]) - 1}
 
 
-def test_a_folder_without_runs_is_explained(tmp_path: Path) -> None:
-    with pytest.raises(DraftError, match="has no run of a study to report on"):
-        writing.write(tmp_path)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_folder_that_is_no_report_is_kept(tmp_path: Path) -> None:
-    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+def test_a_folder_without_runs_or_of_something_else_is_explained(one: Path, tmp_path: Path) -> None:
     mine = tmp_path / "mine"
     mine.mkdir()
+    with pytest.raises(DraftError, match="has no run of a study to report on"):
+        writing.write(mine)
+    assert list(mine.iterdir()) == []
     (mine / "letter.txt").write_text("dear")
     with pytest.raises(DraftError, match="is not a report of Draft; it is kept"):
-        writing.write(folder, mine)
+        writing.write(one, mine)
     assert (mine / "letter.txt").read_text() == "dear"
 
 
-def test_a_report_that_fails_leaves_the_old_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+def test_a_report_that_fails_leaves_the_old_one(one: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(writing, "save", lambda *args: [])
     monkeypatch.setattr(writing, "_pictures", lambda *args: {})
     monkeypatch.setattr(writing, "html", lambda page: "old")
-    page = writing.write(folder)
+    page = writing.write(one)
 
     def fail(page: object) -> str:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(writing, "html", fail)
     with pytest.raises(DraftError, match="no space left"):
-        writing.write(folder)
+        writing.write(one)
     assert page.read_text() == "old"
-    assert {path.name for path in folder.iterdir()} == {"runs", "report"}
+    assert {path.name for path in one.iterdir()} == {"runs", "report"}
 
 
-def test_without_a_renderer_the_page_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_renderer_the_page_says_so(one: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(members: Any) -> Any:
         raise DraftError("MuJoCo cannot draw on this machine")
 
-    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **BASE_ONLY)
     monkeypatch.setattr(robots, "render", refuse)
-    page = writing.write(folder)
-    assert "the picture of the robots: MuJoCo cannot draw on this machine" in page.read_text(
-        encoding="utf-8"
-    )
+    page = writing.write(one)
+    words = "the picture of the robots: MuJoCo cannot draw on this machine"
+    assert words in page.read_text(encoding="utf-8")
     assert not (page.parent / "figures/robots.png").exists()
 
 
@@ -387,15 +354,9 @@ def test_names_stand_at_lines_that_fall_and_beside_those_that_do_not() -> None:
     assert places["never"] == pytest.approx((8, 0.03), abs=0.05)
 
 
-def test_designs_keep_their_order_by_leg_length(source: Path) -> None:
-    study: Study = gather(source)
-    lengths = [member.leg_length for member in study.members.values()]
-    assert lengths == sorted(lengths)
-
-
 def test_a_family_is_named_with_the_command_that_draws_it(tmp_path: Path) -> None:
     synthetic.family(tmp_path, lambda t, r: t * r, (0.21, 0.3), (5.0, 10.0))
     page = page_of(tmp_path)
     assert "4 members of families" in page
     assert "Runs of families: family-velocity-0." in page
-    assert "draft surface ROBOT --policy RUN" in page
+    assert "draft surface ROBOT" in page

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 import statistics
@@ -16,8 +15,8 @@ pytest.importorskip("pyarrow")
 
 from PIL import Image
 
-from draft.cli import BAD_INPUT, main
-from draft.study.report import collected as files
+from draft.cli.display.results import commands
+from draft.study.report import folder as files
 from draft.study.report import writing
 from draft.study.report.collect import collect
 from draft.study.report.figures import shrink
@@ -26,6 +25,7 @@ from draft.study.report.occupancy import Utilisation
 from draft.study.report.sections import Contents, Source
 from draft.study.report.tables import all_tables
 from draft.study.report.writing import write_page
+from tests.commands import Command
 from tests.learn import synthetic
 
 # 3.1 and 4.2 m/s times 0.94 and 1 by seed, times 0.93 with inertia errors; see `synthetic.able`.
@@ -48,9 +48,10 @@ kick/√(gL)  perturbed inertia  bear > cheetah   > 99 %             2
 
 
 def text_of(folder: Path, page: Path) -> str:
-    study = files.read(folder)
+    study = files.read(folder, results=True)
     used = Utilisation(study)
-    contents = Contents(study, all_tables(study, used), {}, Source(folder, page, {}))
+    source = Source(folder, page, {}, commands(study, folder, page, ()))
+    contents = Contents(study, all_tables(study, used), {}, source)
     return markdown(contents.page(), page.parent)
 
 
@@ -74,15 +75,19 @@ def test_the_page_names_each_design_and_skill_with_its_seeds(
     assert not re.search(r"\b(nan|None|inf)\b", said)
 
 
-def test_numbers_of_the_page_are_those_of_the_data(collected: Path, tmp_path: Path) -> None:
-    """Another study gives another page: nothing is written into the text."""
+def test_numbers_and_strips_of_the_page_are_those_of_the_data(tmp_path: Path) -> None:
+    # Another study gives another page: nothing is written into the text.
     folder = synthetic.study(tmp_path / "s", ("bear",), (5,), ("nominal",), ("push",))
-    collect(folder, tmp_path / "out")
-    said = text_of(tmp_path / "out", tmp_path / "page.md")
+    out = tmp_path / "out"
+    collect(folder, out)
+    (out / "strips").mkdir()
+    (out / "strips/bear-run.png").write_bytes(b"")
+    said = text_of(out, tmp_path / "docs/page.md")
     assert "Designs: bear. Stages: push. Seed 5." in said
     assert "cheetah" not in said
     assert "With inertia errors" not in said
     assert "Order of the designs" not in said
+    assert "![bear: run](../out/strips/bear-run.png)" in said
 
 
 def test_the_page_is_written_with_small_figures_and_again_the_same(
@@ -92,8 +97,9 @@ def test_the_page_is_written_with_small_figures_and_again_the_same(
     page = Path("docs/results.md")
     (tmp_path / "docs/images/results").mkdir(parents=True)
     (tmp_path / "docs/images/results/old.png").write_bytes(b"")
-    study = files.read(collected)
-    found = write_page(study, collected, page)
+    study = files.read(collected, results=True)
+    lines = commands(study, collected, page, ())
+    found = write_page(study, collected, page, lines)
     first = {path: path.read_bytes() for path in found}
     assert all(len(data) < 100_000 for path, data in first.items() if path.suffix == ".png")
     links = re.findall(r"!\[[^]]+\]\(([^)]+)\)", page.read_text())
@@ -101,18 +107,8 @@ def test_the_page_is_written_with_small_figures_and_again_the_same(
     assert {path.name for path in Path("docs/images/results").iterdir()} == {
         path.name for path in found[1:]
     }
-    assert {path: path.read_bytes() for path in write_page(study, collected, page)} == first
+    assert {path: path.read_bytes() for path in write_page(study, collected, page, lines)} == first
     assert str(tmp_path) not in page.read_text()
-
-
-def test_strips_in_the_results_are_shown(tmp_path: Path) -> None:
-    folder = synthetic.study(tmp_path / "s", ("bear",), (0,), ("nominal",), ("velocity",))
-    out = tmp_path / "out"
-    collect(folder, out)
-    (out / "strips").mkdir()
-    (out / "strips/bear-run.png").write_bytes(b"")
-    said = text_of(out, tmp_path / "docs/results.md")
-    assert "![bear: run](../out/strips/bear-run.png)" in said
 
 
 def test_a_shrunk_picture_looks_the_same(tmp_path: Path) -> None:
@@ -127,53 +123,48 @@ def test_a_shrunk_picture_looks_the_same(tmp_path: Path) -> None:
     assert np.abs(seen - image[::2, ::2]).max() <= 6
 
 
-def test_results_are_printed_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_results_are_printed_as_tables(tmp_path: Path, command: Command) -> None:
     folder = synthetic.study(tmp_path / "s", ("cheetah", "bear"), (0, 1), stages=("push",))
-    out = str(tmp_path / "out")
-    assert main(["study", "collect", str(folder), "--out", out]) == 0
-    said = capsys.readouterr().out
+    out = tmp_path / "out"
+    said = command(f"study collect {folder} --out {out}").out
     assert f"{out}: 4 runs, 4 new, 0 changed; 0." in said
     assert "missing: cheetah: no velocity policy was trained" in said
-    assert main(["study", "results", out]) == 0
-    said = "\n".join(line.rstrip() for line in capsys.readouterr().out.splitlines())
+    shown = command(f"study results {out}").out
+    said = "\n".join(line.rstrip() for line in shown.splitlines())
     for (design, arm), kick in KICKS.items():
         (row,) = [line for line in said.splitlines() if re.match(f"{design} .* {arm} ", line)]
         assert row.split()[-4:] == [*kick.split(), "not", "evaluated"]
     assert PRINTED in said
     assert "cheetah, bear  push   0, 1" in said
-    assert main(["study", "results", out, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = command.json(f"study results {out}")
     assert told["provenance"][0]["Draft"] == "0.1.0"
     assert [row["design"] for row in told["capability"]] == ["cheetah"] * 2 + ["bear"] * 2
 
 
-def test_a_page_that_is_no_markdown_is_refused(
-    collected: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["study", "results", str(collected), "--write", "page.html"]) == BAD_INPUT
-    assert "is not a Markdown file" in capsys.readouterr().err
-
-
-def test_results_that_are_not_there_are_explained(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_results_or_a_page_that_cannot_be_are_refused(
+    source: Path, collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["study", "results"]) == BAD_INPUT
-    assert "'examples/results/three_quadrupeds' holds no results" in capsys.readouterr().err
+    err = command.refuses(f"study results {collected} --write page.html")
+    assert "is not a Markdown file" in err
+    err = command.refuses(f"study results {source}")
+    assert f"'draft study collect {source} --out DIR'" in err
+    err = command.refuses("study results")
+    assert "'examples/results/three_quadrupeds' holds no results" in err
 
 
 def test_the_page_in_the_repository_is_what_its_command_writes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     root = Path(__file__).parents[3]
     page = Path("docs/results.md")
     kept = (root / page).read_text(encoding="utf-8")
-    (command,) = re.findall(r"<!-- Written by `draft (.+?)`; do not edit. -->", kept)
+    (line,) = re.findall(r"<!-- Written by `draft (.+?)`; do not edit. -->", kept)
     shutil.copytree(root / "examples/results", tmp_path / "examples/results")
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs/learning.md").touch()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(writing, "save", lambda folder, makers, *_: [])
-    assert main(command.split()) == 0
+    command(line)
     written = page.read_text(encoding="utf-8")
     assert written.splitlines() == kept.splitlines()

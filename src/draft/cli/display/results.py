@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from rich.markup import escape
@@ -95,6 +96,24 @@ def write_page(study: Study, folder: Path, page: Path, others: Mapping[Path, Stu
     if page.suffix != ".md":
         cause = f"--write {page} is not a Markdown file"
         raise DraftError(cause, "name one such as docs/results.md")
-    page_, *pictures = written(study, folder, page, others)
+    page_, *pictures = written(study, folder, page, commands(study, folder, page, others), others)
     place = pictures[0].parent if pictures else page_.parent
     print(f"{page_}, with {len(pictures)} figures in {place}")
+
+
+def commands(study: Study, folder: Path, page: Path, others: Collection[Path]) -> list[str]:
+    """Return the command lines that repeat a study, collect its results and write their page."""
+    from draft.study.report.sections import place_of
+
+    file, place = folder / f"{study.name}.yaml", place_of(folder)
+    toy = bool(study.planned and study.planned.toy)
+    made = f"studies/{study.name}{'-toy' * toy}"
+    run = f"draft study {place}/{file.name}{' --toy' * toy}   # to {made}, in slices if need be"
+    against = " ".join([" --against", *map(place_of, others)]) if others else ""
+    relative = os.path.relpath(page)
+    named = page.name if relative.startswith("..") else Path(relative).as_posix()
+    return [
+        *[run] * file.is_file(),
+        f"draft study collect {made} --out {place}",
+        f"draft study results {place}{against} --write {named}",
+    ]

@@ -36,12 +36,15 @@ FEWEST = 5
 Fitter = Callable[[Array, Array], Array]
 
 
-def structure_trends(rows: Path = ROWS, without: Collection[str] = ()) -> dict[str, Any]:
+def structure_trends(
+    rows: Path = ROWS, without: Collection[str] = (), of: Collection[str] = tuple(SIZE)
+) -> dict[str, Any]:
     """Fit every structure trend; returns the content of the coefficients file.
 
     Args:
         rows: table of segments.
         without: keys of robots that are held out.
+        of: populations whose trends are fitted; the ends of limbs have one law for all.
 
     Raises:
         DescriptionError: the table cannot be read, has fewer than five robots of a population, or
@@ -62,13 +65,15 @@ def structure_trends(rows: Path = ROWS, without: Collection[str] = ()) -> dict[s
             raise DescriptionError(Problem(cause, Location(str(rows)), f"at least {FEWEST}"))
     table: dict[str, Any] = {"source": SOURCE}
     for name, robots in populations.items():
-        table[name] = _population(name, robots)
+        table[name] = _population(name, robots) if name in of else {}
     known_feet = [foot for foot in feet.feet() if foot.used and foot.key not in without]
     keys = [foot.key for foot in known_feet]
     end = _held_out(feet.fit(known_feet), *feet.columns(known_feet), keys, fits.proportional)
     table["quadruped"]["end"] = {**end.record(), **feet.quartiles(known_feet)}
-    across = holdout.across(populations["humanoid"], populations["quadruped"], holdout.published)
-    table["quadruped"]["held_out"]["by_humanoid_trends"] = across.fold
+    if "quadruped" in of:
+        people, quadrupeds = populations["humanoid"], populations["quadruped"]
+        across = holdout.across(people, quadrupeds, holdout.published)
+        table["quadruped"]["held_out"]["by_humanoid_trends"] = across.fold
     return rounded(table)
 
 

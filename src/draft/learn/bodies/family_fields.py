@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from draft.learn.bodies.payload import model_spec
 from draft.model.batch_text import read_fields
 
 if TYPE_CHECKING:
@@ -25,4 +26,5 @@ def family_fields(
     Raises:
         DraftError: a design differs from the first in more than numbers.
     """
-    return read_fields([m.text for m in members], [m.name for m in members])
+    load = (lambda row: model_spec(members[row]).compile()) if members[0].block else None
+    return read_fields([m.text for m in members], [m.name for m in members], load)

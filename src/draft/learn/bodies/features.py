@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from draft.learn.bodies.family_fields import family_fields
 from draft.learn.bodies.legged import CLASSES, REFERENCE_LEG, LeggedRobot
+from draft.learn.bodies.payload import model_spec
 
 GRAVITY = 9.81
 _MASS = 30.0  # Approximate mass of a quadruped of scale one [kg].
@@ -57,8 +58,8 @@ def features(member: LeggedRobot, model: mujoco.MjModel | None = None) -> tuple[
     """
     if not member.is_quadruped:
         return ()
-    model = model or mujoco.MjModel.from_xml_string(member.xml)
-    return _features(member, model, mujoco.MjData(model))
+    own: mujoco.MjModel = model or model_spec(member).compile()
+    return _features(member, own, mujoco.MjData(own))
 
 
 def family_features(members: tuple[LeggedRobot, ...]) -> list[tuple[float, ...]]:

@@ -67,6 +67,7 @@ class LeggedRobot:
         rated_torque: rated torque of each joint [N m]; () if all are those of the trend.
         electronics: stated power of computers, sensors and idle drives [W]; () if the design states
             none.
+        block: half side and middle of a payload [m], which is not in the text; () without one.
     """
 
     name: str
@@ -93,6 +94,7 @@ class LeggedRobot:
     battery: tuple[float, ...] = ()
     electronics: tuple[float, ...] = ()
     rated_torque: tuple[float, ...] = ()
+    block: tuple[float, ...] = ()
 
     @property
     def xml(self) -> str:
@@ -160,7 +162,9 @@ class LeggedRobot:
 
 
 # Defaults of the fields that were added later: older records lack them.
-_LATER: dict[str, Any] = {"corner_speed": (), "battery": (), "electronics": (), "rated_torque": ()}
+_LATER: dict[str, Any] = dict.fromkeys(
+    ("corner_speed", "battery", "electronics", "rated_torque", "block"), ()
+)
 
 
 def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
@@ -182,7 +186,7 @@ def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
     model = model or design.build()
     joints = tuple(design.joints)
     index = {joint: i for i, joint in enumerate(joints)}
-    home = _home(design, model, name)
+    home = _home(design, name)
     sites = [foot_of(design, chain) for chain in chains]
     return LeggedRobot(
         name=name,
@@ -271,7 +275,7 @@ def check_family(members: Sequence[LeggedRobot]) -> None:
                 raise DraftError(cause, remedy)
 
 
-def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
+def _home(design: Design, name: str) -> tuple[float, ...]:
     """Home pose; the crouch if the spec gives none."""
     home = {joint: scalar(one.home) for joint, one in design.joints.items()}
     if not any(home.values()):

@@ -14,12 +14,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import requires
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from draft.errors import DraftError, counted
 from draft.extras import installed, need
 
-EngineName = Literal["auto", "native", "warp"]
+EngineName = Annotated[
+    Literal["auto", "native", "warp"],
+    Field(
+        description="Physics: native MuJoCo on the CPU, or MuJoCo Warp; auto is native without a "
+        "GPU."
+    ),
+]
 NATIVE, WARP = "native", "warp"
 KINDS = {NATIVE: "native MuJoCo", WARP: "MuJoCo Warp"}
 _WARP_REMEDY = 'use `engine="warp"`, which runs anywhere and is some 15 times slower on a CPU'

@@ -54,6 +54,14 @@ class Extras(BaseModel):
     """Delay of the joint targets [s], at most a control period."""
 
 
+class OnDevice(Settings):
+    """Where roll-outs run."""
+
+    device: Annotated[str, Shown("DEVICE")] = "auto"
+    """Device: auto, cpu, cuda or cuda:1."""
+    engine: EngineName = "auto"
+
+
 class RollOuts(Settings):
     """Numbers of roll-outs, also in a study's file."""
 
@@ -63,6 +71,41 @@ class RollOuts(Settings):
     """Length of a roll-out [s]; the first sixth is not counted, and kicks come every quarter."""
     seed: Annotated[int, Field(ge=0, le=2**31 - 1), Shown("N")] = 0
     """Seed of everything random."""
+
+
+class BodyRollOuts(RollOuts):
+    """Numbers of roll-outs that measure each of many bodies."""
+
+    replicas: Annotated[int, Field(ge=1, le=1000), Shown("N")] = 3
+    """Roll-outs of each design at each speed and kick."""
+    seconds: Annotated[float, Field(ge=1, le=1000), Shown("S", unit="s")] = 6.0
+    """Length of a roll-out, whose last third is measured [s]."""
+
+
+class SeeingPolicy(Settings):
+    """Policy that measures many bodies."""
+
+    policy: Annotated[
+        str | Path | None, Shown("RUN|FILE.onnx", "the policy of quadrupeds that ships")
+    ] = None
+    """Policy of learned metrics, which observes its design: a run, or an exported one."""
+
+
+class LearnedMetrics(SeeingPolicy):
+    """Settings of metrics that are measured with a policy, such as `learned.top_speed`."""
+
+    outside: bool = False
+    """Measure learned metrics outside the policy's region of validity too, as of imports; it may
+    fail there, and `learned.inside` tells them apart."""
+
+
+class SurfaceSettings(OnDevice, BodyRollOuts):
+    """Settings of a surface."""
+
+    points: Annotated[int, Field(ge=2, le=100), Shown("N")] = 20
+    """Points along each range; 20 x 20 designs take about 5 min on two idle cores."""
+    progress: Annotated[Callable[[int, int], object] | None, Field(exclude=True)] = None
+    """Called with the designs done and their number."""
 
 
 class Target(Settings):
@@ -93,7 +136,7 @@ class Target(Settings):
     """Iterations of the checkpoint."""
 
 
-class Options(Extras, RollOuts, Target):
+class Options(OnDevice, Extras, RollOuts, Target):
     """Options of an evaluation."""
 
     errors: Annotated[ErrorSource | None, Shown("{twins,survey,paper}", "none")] = None
@@ -101,10 +144,6 @@ class Options(Extras, RollOuts, Target):
     trends, or the published ranges."""
     protocol: Protocol = "walking"
     """Protocol: "walking", or "published", in which one robot in ten stands."""
-    device: Annotated[str, Shown("DEVICE")] = "auto"
-    """Device: auto, cpu, cuda or cuda:1."""
-    engine: EngineName = "auto"
-    """Physics: native MuJoCo on the CPU, or MuJoCo Warp; auto is native without a GPU."""
     out: Annotated[
         str | Path | None, Shown("DIR", "RUN/evaluation, or out/DESIGN-POLICY/evaluation")
     ] = None

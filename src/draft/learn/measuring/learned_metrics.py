@@ -23,13 +23,13 @@ from draft.learn.bodies.legged import LeggedRobot, check_family, legged_robot
 from draft.learn.bodies.legged_batch import legged_robots
 from draft.learn.measuring.energy import add_energy
 from draft.learn.measuring.evaluation import setting
+from draft.learn.measuring.evaluation_options import BodyRollOuts
 from draft.learn.measuring.heating import add_heat
 from draft.learn.measuring.levels import PUSH, SKILL_TESTS, SPEED, SkillTest
 from draft.learn.measuring.policies import Source
 from draft.learn.measuring.scalars import Worlds, curves, scalars
 from draft.learn.measuring.utilisation import Histograms, utilisation
 from draft.metrics.capabilities import MEASURED
-from draft.metrics.learned import REPLICAS, SECONDS
 from draft.values import Array
 
 if TYPE_CHECKING:
@@ -83,10 +83,7 @@ def measure(
     members: Sequence[LeggedRobot],
     device: str,
     engine: Engine,
-    *,
-    replicas: int = REPLICAS,
-    seconds: float = SECONDS,
-    seed: int = 0,
+    rollouts: BodyRollOuts,
     report: Report = lambda done, of: None,
 ) -> Learned:
     """Measure the capabilities of bodies with a policy.
@@ -96,9 +93,7 @@ def measure(
         members: bodies of one topology.
         device: "cpu" or "cuda:0" and the like.
         engine: physics engine.
-        replicas: roll-outs of each body at each level.
-        seconds: duration of a roll-out [s].
-        seed: seed of everything random.
+        rollouts: numbers of the roll-outs.
         report: called with the bodies done and their number, after every step.
 
     Raises:
@@ -128,11 +123,12 @@ def measure(
             # A body has one roll-out, or two: the first counts as half of its time.
             report(done + len(own) * step // (2 * steps), len(members))
 
-        task, count = replace(task_of(source.plan), members=own), replicas * len(own)
-        trial = Trial(task, chosen, count, seed=seed, seconds=seconds, settle=SETTLE * seconds)
+        task, count = replace(task_of(source.plan), members=own), rollouts.replicas * len(own)
+        seconds = rollouts.seconds
+        trial = Trial(task, chosen, count, seconds, SETTLE * seconds, seed=rollouts.seed)
         return evaluate(trial, policy, device, advance, engine=engine.name, threads=threads)
 
-    block = max(1, MOST_WORLDS // (replicas * sum(len(one.levels) for one in first)))
+    block = max(1, MOST_WORLDS // (rollouts.replicas * sum(len(one.levels) for one in first)))
     found: list[_One] = []
     for start in range(0, len(members), block):
         own = joined(members[start : start + block])
@@ -163,13 +159,11 @@ def measure(
 def of_designs(
     source: Source,
     design: Design,
+    rollouts: BodyRollOuts,
     rows: NDArray[np.intp] | None = None,
     *,
     device: str = "auto",
     engine: str = "auto",
-    replicas: int = REPLICAS,
-    seconds: float = SECONDS,
-    seed: int = 0,
     report: Report = lambda done, of: None,
 ) -> tuple[Learned, dict[int, str]]:
     """Measure the capabilities of one design or of N.
@@ -177,12 +171,10 @@ def of_designs(
     Args:
         source: the policy.
         design: one design, or N.
+        rollouts: numbers of the roll-outs.
         rows: which of N designs, increasing; None for those that the filter accepts.
         device: see `draft.learn.engine.machine.devices`.
         engine: "auto", "native" or "warp".
-        replicas: roll-outs of each design at each level.
-        seconds: duration of a roll-out [s].
-        seed: seed of everything random.
         report: called with the designs done and their number.
 
     Returns:
@@ -199,16 +191,7 @@ def of_designs(
         return _spread(None, members, count), reasons
     report(0, len(members))  # The libraries of the simulation take seconds to load.
     chosen, stepper = setting(device, engine)
-    found = measure(
-        source,
-        tuple(members.values()),
-        chosen,
-        stepper,
-        replicas=replicas,
-        seconds=seconds,
-        seed=seed,
-        report=report,
-    )
+    found = measure(source, tuple(members.values()), chosen, stepper, rollouts, report)
     return _spread(found, members, count), reasons
 
 

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from draft.learn.training.run import Plan
 
 SPEED, ASCENT, DESCENT, PUSH, WALK = "speed", "ascent", "descent", "push", "walk"
-REPLICAS = 256
-SECONDS, SETTLE = 12.0, 2.0  # Duration of a roll-out, and time at its start not measured [s].
+PARTS = 6  # Of a roll-out; the first is not measured.
 KICKS = 4  # Parts of a roll-out between which kicks happen: at 3, 6 and 9 s.
 WALKING = 0.4  # Command of all tests but `speed` [m/s].
 # Published protocol: share of robots that stand, smallest vx of those commanded ahead [m/s].
@@ -69,7 +68,7 @@ SKILL_TESTS = {
         SkillTest(WALK, "flat", "m/s", (WALKING,)),
     )
 }
-# Names on the command line, in the order of the published stages.
+# Names of the arguments `test`, in the order of the published stages.
 WORDS = {"walk": (WALK,), "speed": (SPEED,), "stairs": (ASCENT, DESCENT), "push": (PUSH,)}
 
 
@@ -122,7 +121,7 @@ def no_levels(given: str, most: float | None = None) -> DraftError:
 
 def settle(seconds: float) -> float:
     """Time at the start of a roll-out that is not measured [s]."""
-    return seconds / (SECONDS / SETTLE)
+    return seconds / PARTS
 
 
 def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:
@@ -140,27 +139,6 @@ def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:
     return tuple(levels[round(i * last / (count - 1))] for i in range(count))
 
 
-def check_stage(chosen: Sequence[SkillTest], stage: str, run: object) -> None:
-    """Check that skill tests are for the stage of a policy.
-
-    Args:
-        chosen: the tests.
-        stage: stage of the policy.
-        run: its run, for the message.
-
-    Raises:
-        DraftError: one is for another stage.
-    """
-    for test in chosen:
-        if _word(test) not in of_stage(stage):
-            cause = (
-                f"test '{_word(test)}' is for policies of stage {_stages(test)}, and "
-                f"{run} is of stage {stage}"
-            )
-            own = ", ".join(of_stage(stage))
-            raise DraftError(cause, f"use `test` {own}, or add `force`")
-
-
 def flags(
     chosen: Sequence[SkillTest], plan: Plan, iteration: int, reached: Reached = UNRECORDED
 ) -> list[str]:
@@ -174,9 +152,10 @@ def flags(
     """
     notes = []
     for test in chosen:
-        if _word(test) not in of_stage(plan.stage):
+        word = next(word for word, names in WORDS.items() if test.name in names)
+        if word not in of_stage(plan.stage):
             notes.append(
-                f"{test.name}: for policies of stage {_stages(test)}; this one is of stage "
+                f"{test.name}: for policies of stage {stages_of(word)}; this one is of stage "
                 f"{plan.stage}"
             )
         most = trained(test.name, plan, iteration, reached)
@@ -220,10 +199,6 @@ def trained(name: str, plan: Plan, iteration: int, reached: Reached = UNRECORDED
     return min(config.commands.forward * root, limited.limit * slowest)
 
 
-def _stages(test: SkillTest) -> str:
-    """Names of the stages that a test is for."""
-    return ", ".join(name for name in STAGES if _word(test) in of_stage(name))
-
-
-def _word(test: SkillTest) -> str:
-    return next(word for word, names in WORDS.items() if test.name in names)
+def stages_of(word: str) -> str:
+    """Names of the stages that a name in WORDS is for."""
+    return ", ".join(name for name in STAGES if word in of_stage(name))

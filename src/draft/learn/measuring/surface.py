@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ParamSpec, Protocol
 
 import numpy as np
 
@@ -18,15 +19,16 @@ from draft.design.references import find_design
 from draft.errors import DraftError
 from draft.files import new_folder, write
 from draft.learn.measuring import learned_metrics as learned
-from draft.learn.measuring.learned_metrics import Learned, Report
+from draft.learn.measuring.evaluation_options import SurfaceSettings
+from draft.learn.measuring.learned_metrics import Learned
 from draft.learn.measuring.policies import Source, open_source
-from draft.metrics.learned import REPLICAS, SECONDS
+from draft.settings import by_keyword
 from draft.values import Array
 
 if TYPE_CHECKING:
     from draft.variation.axes import Axis, Vary
 
-MOST_POINTS = 100  # Points along one axis.
+P = ParamSpec("P")
 TABLE, PAGE, RECORD = "surface.csv", "surface.html", "surface.json"
 
 
@@ -70,18 +72,32 @@ class Surface:
         }
 
 
+class _Surface(Protocol[P]):
+    """Type of `surface`, with the settings as keyword arguments."""
+
+    def __call__(
+        self,
+        design: Design | str,
+        vary: Vary,
+        policy: Source | str | Path | None = None,
+        *args: P.args,
+        **settings: P.kwargs,
+    ) -> Surface: ...
+
+
+def _with_settings(
+    record: Callable[P, SurfaceSettings],
+) -> Callable[[Callable[..., Surface]], _Surface[P]]:
+    return by_keyword(record)
+
+
+@_with_settings(SurfaceSettings)
 def surface(
     design: Design | str,
     vary: Vary,
     policy: Source | str | Path | None = None,
     *,
-    points: int = 20,
-    replicas: int = REPLICAS,
-    seconds: float = SECONDS,
-    seed: int = 0,
-    device: str = "auto",
-    engine: str = "auto",
-    progress: Report | None = None,
+    settings: SurfaceSettings,
 ) -> Surface:
     """Measure a trained policy on designs over a plane of two numbers.
 
@@ -94,39 +110,34 @@ def surface(
         design: the design that is varied, or its name.
         vary: two ranges, such as `{"thigh_length": (0.2, 0.4), ...}` or "thigh_length=0.2:0.4".
         policy: run or ONNX file of a policy that observes its design; None for the one that ships.
-        points: points along each range.
-        replicas: roll-outs of each design at each speed and kick.
-        seconds: duration of a roll-out [s].
-        seed: seed of everything random.
-        device: see `draft.learn.engine.machine.devices`.
-        engine: "auto", "native" or "warp".
-        progress: called with the designs done and their number.
+        settings: fields of `SurfaceSettings`, by keyword.
 
     Raises:
-        DraftError: the ranges are not two or invalid, no design can be measured, or the policy does
-            not fit.
+        DraftError: the ranges are not two, an argument is invalid, no design can be measured, or
+            the policy does not fit.
     """
     from draft.variation import axes as axes_of
     from draft.variation import sampling
 
     if isinstance(design, str):
         design = find_design(design).resolve()
-    _check(vary, points, replicas, seconds)
+    if len(vary) != 2:
+        cause = f"a surface needs two ranges, and `vary` has {len(vary)}"
+        remedy = "such as `vary` thigh_length=0.2:0.4 actuators.leg.peak_torque=40:120"
+        raise DraftError(cause, remedy)
     source = policy if isinstance(policy, Source) else open_source(policy)
     axes = [_rising(axis) for axis in axes_of.parse(design.spec, vary)]
     first, second = axes
-    count = (len(first.values) or points) * (len(second.values) or points)
+    count = math.prod(len(axis.values) or settings.points for axis in axes)
     drawn = sampling.draw(axes, "grid", count, 0, 0, count)
     many = design.spec.resolve(dict(design.values), drawn)
     found, reasons = learned.of_designs(
         source,
         many,
-        device=device,
-        engine=engine,
-        replicas=replicas,
-        seconds=seconds,
-        seed=seed,
-        report=progress or (lambda done, of: None),
+        settings,
+        device=settings.device,
+        engine=settings.engine,
+        report=settings.progress or (lambda done, of: None),
     )
     refusal = tuple(first_error(many.findings, row) or reasons.get(row, "") for row in range(count))
     if all(refusal):
@@ -197,18 +208,3 @@ def _rising(axis: Axis) -> Axis:
         cause = f"`vary` {axis.name} needs different values, at least two, for a surface"
         raise DraftError(cause, f"such as {axis.name}=0.2:0.4, or 0.2,0.3,0.4")
     return replace(axis, values=listed)
-
-
-def _check(vary: Vary, points: int, replicas: int, seconds: float) -> None:
-    if len(vary) != 2:
-        cause = f"a surface needs two ranges, and `vary` has {len(vary)}"
-        remedy = "such as `vary` thigh_length=0.2:0.4 actuators.leg.peak_torque=40:120"
-        raise DraftError(cause, remedy)
-    for name, value, low, high in (
-        ("points", points, 2, MOST_POINTS),
-        ("replicas", replicas, 1, 1000),
-        ("seconds", seconds, 1.0, 1000.0),
-    ):
-        if not low <= value <= high:
-            cause = f"`{name}` {value:g} is not from {low:g} to {high:g}"
-            raise DraftError(cause, "omit it for the default")

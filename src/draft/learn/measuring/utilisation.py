@@ -89,12 +89,6 @@ def percentile(counts: np.ndarray, share: float = PERCENTILE) -> float | None:
     return float((i + (wanted - before) / counts[i]) * WIDTH)
 
 
-def above(counts: np.ndarray, limit: float = NEAR) -> float | None:
-    """Share of the samples above an edge of a bin; None without samples."""
-    total = counts.sum()
-    return float(counts[round(limit / WIDTH) :].sum() / total) if total else None
-
-
 class Limiting(TypedDict):
     """Joint class nearest its limit.
 
@@ -187,4 +181,6 @@ def _level(test: str, curve: Curve, values: Mapping[str, float | None]) -> float
 def _shares(counts: np.ndarray) -> dict[str, float | None]:
     """Percentiles of a class, counts of shape (quantities, bins)."""
     shares = {name: percentile(counts[i]) for i, name in enumerate(QUANTITIES)}
-    return shares | {"near_peak": above(counts[0])}
+    torques = counts[0]
+    near = float(torques[round(NEAR / WIDTH) :].sum() / total) if (total := torques.sum()) else None
+    return shares | {"near_peak": near}

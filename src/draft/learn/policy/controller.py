@@ -46,7 +46,7 @@ class Controller:
         self._q, self._v = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         base = model.jnt_bodyid[0] if model.njnt else 0
         if not model.njnt or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE:
-            remedy = "use a model that 'draft build' wrote"
+            remedy = "use a model that Draft built"
             raise DraftError("the model's first joint is not a free joint", remedy)
         self._trunk = int(base)
         self._sensors = [_sensor(model, name) for name in ("imu_lin_vel", "imu_ang_vel")]

@@ -100,7 +100,7 @@ def read(path: Path) -> Network:
         return _network(path.read_bytes())
     except OSError as error:
         cause, remedy = f"cannot read {path}: {error.strerror}", "check its name"
-    except (ValueError, KeyError, IndexError, struct.error) as error:
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, struct.error) as error:
         cause = f"{path} is not a policy that Draft can read: {error}"
         remedy = "use a file that 'draft play' wrote"
     raise DraftError(cause, remedy) from None

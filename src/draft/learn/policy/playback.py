@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ParamSpec, Protocol
 
 import mujoco
 import numpy as np
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.design.references import find_design
-from draft.errors import DraftError
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.policy.controller import Controller
+from draft.learn.policy.play_options import Command, Course, PlaySettings
 from draft.learn.policy.policy import SKILLS, Policy, designs, open_policy, short
 from draft.learn.policy.policy import policy as shipped
 from draft.learn.policy.scenery import dress
@@ -23,16 +23,16 @@ from draft.learn.policy.validity import check_drives, fit
 from draft.learn.task.groups import Episodes, Ground
 from draft.learn.task.stages import is_like
 from draft.model import Model
+from draft.settings import by_keyword
 
-Command = tuple[float, float, float]
+P = ParamSpec("P")
 SETTLING = 1.0  # Time after the start from rest that measures of walking exclude [s].
 STEPS, WIDTH = 4, 6.0  # Number of steps of a flight; their width [m].
 _RUN_UP, _LANDING = 1.5, 2.0  # Distance before the steps, and between up and down [m].
-FASTEST, TALLEST = 100.0, 0.6  # Largest command or kick [m/s]; height of steps [m].
-MOST_SECONDS = 600.0  # Longest playback [s].
 KICK_EVERY = 3.0  # Time between two kicks [s].
 # Depth of steps and criteria of a fall are those of training.
 _TREAD, _EPISODES = Ground().tread, Episodes()
+_AS_USUAL = Course()
 
 
 @dataclass(frozen=True)
@@ -206,16 +206,32 @@ def _flight(step: float) -> list[tuple[float, float, float]]:
     return [(_RUN_UP + i * _TREAD, whole - 2 * i * _TREAD, (i + 1) * step) for i in range(STEPS)]
 
 
+class _Play(Protocol[P]):
+    """Type of `play`, with the settings as keyword arguments."""
+
+    def __call__(
+        self,
+        design: Design | str,
+        skill: str | None = None,
+        policy: str | Path | None = None,
+        *args: P.args,
+        **settings: P.kwargs,
+    ) -> Outcome: ...
+
+
+def _with_settings(
+    record: Callable[P, PlaySettings],
+) -> Callable[[Callable[..., Outcome]], _Play[P]]:
+    return by_keyword(record)
+
+
+@_with_settings(PlaySettings)
 def play(
     design: Design | str,
     skill: str | None = None,
     policy: str | Path | None = None,
     *,
-    command: Command | None = None,
-    step: float | None = None,
-    kick: float | None = None,
-    seconds: float = 8.0,
-    seed: int = 0,
+    settings: PlaySettings,
 ) -> Outcome:
     """Let a robot walk in plain MuJoCo with the policy that fits it best.
 
@@ -227,11 +243,7 @@ def play(
         design: the robot, or its name.
         skill: "walk", "run", "climb" or "push"; None for "walk".
         policy: an ONNX file that `draft play` wrote; None for a shipped policy.
-        command: vx, vy [m/s], wz [rad/s]; None for straight ahead, as fast as suits the policy.
-        step: height of the steps ahead [m]; None for that of the skill.
-        kick: largest kick along x and y, every few seconds [m/s]; None for that of the skill.
-        seconds: duration [s].
-        seed: seed of kicks and of joint offsets at the start.
+        settings: fields of `PlaySettings`, by keyword.
 
     Returns:
         Mean speed and tracking error after settling, and the number of falls. `playback` gives the
@@ -241,39 +253,17 @@ def play(
         DraftError: no policy drives the robot, an argument is out of range, or the simulation
             diverges.
     """
-    check(command, step, kick, seconds)
     found = find_design(design).resolve() if isinstance(design, str) else design
     own = () if policy is None else (policy,)
-    return playback(found, skill, own, command, step, kick, seed)[0].play(seconds)
-
-
-def check(command: Command | None, step: float | None, kick: float | None, seconds: float) -> None:
-    """Refuse numbers of a playback that are out of range; see `play` for them.
-
-    Raises:
-        DraftError: one is.
-    """
-    if command is not None and not all(
-        math.isfinite(value) and abs(value) <= FASTEST for value in command
-    ):
-        cause = f"`command` {' '.join(f'{value:g}' for value in command)} is out of range"
-        raise DraftError(cause, f"give three numbers from {-FASTEST:g} to {FASTEST:g}")
-    for name, value, most, unit in (("step", step, TALLEST, "m"), ("kick", kick, FASTEST, "m/s")):
-        if value is not None and not 0 <= value <= most:
-            cause = f"`{name}` {value:g} is not from 0 to {most:g} {unit}"
-            raise DraftError(cause, "omit it for the default of the skill")
-    if not 0 < seconds <= MOST_SECONDS:
-        cause = f"`seconds` {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
-        raise DraftError(cause, "such as 8")
+    robot, _ = playback(found, skill, own, settings, settings.seed)
+    return robot.play(settings.seconds)
 
 
 def playback(
     design: Design,
     skill: str | None = None,
     own: Sequence[str | Path] = (),
-    command: Command | None = None,
-    step: float | None = None,
-    kick: float | None = None,
+    course: Course = _AS_USUAL,
     seed: int = 0,
 ) -> tuple[Playback, str]:
     """Put a robot into the scene of a skill, with the policy that fits it best.
@@ -282,9 +272,7 @@ def playback(
         design: the robot.
         skill: "walk", "run", "climb" or "push"; None for "walk", or what `own` was trained for.
         own: ONNX files to choose from; empty for the shipped policies.
-        command: vx, vy [m/s], wz [rad/s]; None for straight ahead.
-        step: height of the steps ahead [m]; None for that of the skill.
-        kick: largest kick along x and y [m/s]; None for that of the skill.
+        course: what the robot is asked to do.
         seed: seed of kicks and of joint offsets at the start.
 
     Returns:
@@ -303,9 +291,9 @@ def playback(
         chosen, warning = fitting.policy, fitting.warning
     usually = usual(chosen, chosen.stage if own and not skill else SKILLS[skill or "walk"])
     scenario = Scenario(
-        command=command or usually.command,
-        step=usually.step if step is None else step,
-        kick=usually.kick if kick is None else kick,
+        command=course.command or usually.command,
+        step=usually.step if course.step is None else course.step,
+        kick=usually.kick if course.kick is None else course.kick,
     )
     return Playback(chosen, design, scenario, seed), warning
 

@@ -223,7 +223,8 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> F
     seen = features(member, model.mujoco)
     found: list[tuple[Policy, Region, Match, tuple[Departure, ...]]] = []
     reason = ""
-    for known in (_own_regions(policies), _regions(skill)):
+    given = [(one, Region.of(_title(one), one.known, one)) for one in policies]
+    for known in (given, _regions(skill)):
         for one, region in () if found else known:
             chosen = match(one.joints, trained_structure(one), member.joints, own)
             if isinstance(chosen, str):
@@ -262,10 +263,6 @@ def check_drives(policies: Sequence[Policy], model: Model) -> None:
         if isinstance(reason, str):
             cause = f"the policy {one.file} does not drive the joints of {model.design.reference}"
             raise DraftError(f"{cause}: {reason}", "omit it, or train one")
-
-
-def _own_regions(policies: Sequence[Policy]) -> list[tuple[Policy, Region]]:
-    return [(one, Region.of(_title(one), one.known, one)) for one in policies]
 
 
 def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:

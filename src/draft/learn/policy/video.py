@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from draft.files import new_file
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.policy import strip as strips
-from draft.learn.policy.playback import Command, Outcome
+from draft.learn.policy.play_options import Command
+from draft.learn.policy.playback import Outcome
 from draft.model.picture import axes, corners, disc, open_renderer
 
 Pixels = NDArray[np.uint8]

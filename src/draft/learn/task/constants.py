@@ -52,6 +52,11 @@ class Within(NamedTuple):
 ANY = Within("a number", lambda _: True)
 LEAST_ZERO = Within("0 or more", lambda values: min(values) >= 0)
 POSITIVE = Within("above 0", lambda values: min(values) > 0)
+MOST_ITERATIONS = 10**7
+ITERATIONS = Within(
+    f"from 1 to {MOST_ITERATIONS}",
+    lambda values: 1 <= min(values) <= max(values) <= MOST_ITERATIONS,
+)
 SHARE = Within("a share, 0 to 1", lambda values: min(values) >= 0 and max(values) <= 1)
 RANGE = Within(
     "a range from 0 or more, the smaller number first", lambda values: 0 <= values[0] <= values[-1]

@@ -10,7 +10,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from draft.learn.task.constants import ANY, POSITIVE, POSITIVE_RANGE, RANGE, SHARE, choice, paper
+from draft.learn.task.constants import (
+    ANY,
+    ITERATIONS,
+    POSITIVE,
+    POSITIVE_RANGE,
+    RANGE,
+    SHARE,
+    choice,
+    paper,
+)
 from draft.model.scene import DAMPING, STIFFNESS
 
 CONTACT_TIME = 0.02  # MuJoCo's default time constant of contacts [s].
@@ -370,14 +379,14 @@ class Learning:
 
     environments: int = choice(4096, "1", "number of worlds", CODE, within=POSITIVE)
     steps: int = choice(24, "1", "steps per iteration", CODE, within=POSITIVE)
-    iterations_base: int = choice(1200, "1", "iterations of stage base", CODE, within=POSITIVE)
+    iterations_base: int = choice(1200, "1", "iterations of stage base", CODE, within=ITERATIONS)
     iterations_velocity: int = choice(
-        1800, "1", "iterations of stage velocity", CODE, within=POSITIVE
+        1800, "1", "iterations of stage velocity", CODE, within=ITERATIONS
     )
     iterations_terrain: int = choice(
-        2000, "1", "iterations of stage terrain", CODE, within=POSITIVE
+        2000, "1", "iterations of stage terrain", CODE, within=ITERATIONS
     )
-    iterations_push: int = choice(1500, "1", "iterations of stage push", CODE, within=POSITIVE)
+    iterations_push: int = choice(1500, "1", "iterations of stage push", CODE, within=ITERATIONS)
     save_every: int = choice(250, "1", "iterations between two checkpoints", CODE, within=POSITIVE)
     hidden: tuple[int, ...] = choice(
         (512, 256, 128),

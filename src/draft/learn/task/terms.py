@@ -18,7 +18,7 @@ import numpy as np
 
 from draft.errors import DraftError, suggest
 from draft.extensions import Registry
-from draft.learn.task.constants import ANY, POSITIVE, Scaled, Within, choice
+from draft.learn.task.constants import ANY, ITERATIONS, Scaled, Within, choice
 from draft.learn.task.groups import Rewards
 from draft.learn.task.stages import STAGES, Stage
 
@@ -186,7 +186,7 @@ def stage(
     Raises:
         DraftError: the name is taken, there is no such stage, or parameters and numbers differ.
     """
-    own = {"iterations": Number(int(iterations), "1", "iterations of the stage", 0.0, POSITIVE)}
+    own = {"iterations": Number(int(iterations), "1", "iterations of the stage", 0.0, ITERATIONS)}
     return _registration(
         "stage",
         own,

@@ -16,6 +16,7 @@ from pydantic import Field
 from pydantic_core import CoreSchema, core_schema
 
 from draft.learn.engine.machine import EngineName
+from draft.learn.task.constants import MOST_ITERATIONS
 from draft.learn.task.recipes import RecipeName
 from draft.learn.task.stages import StageName
 from draft.settings import Settings, Shown
@@ -77,14 +78,15 @@ class TaskOptions(Settings):
 class SliceOptions(Settings):
     """What does not change what is learned: how far, for how long, and on what."""
 
-    iterations: Annotated[int | None, Field(ge=1, le=10**7), Shown("N", "the stage's")] = None
+    iterations: Annotated[
+        int | None, Field(ge=1, le=MOST_ITERATIONS), Shown("N", "the stage's")
+    ] = None
     """Iterations in all slices."""
     minutes: Annotated[float | None, Field(gt=0, le=10**6), Shown("M", "no limit")] = None
     """Time limit [min]; repeat the training to resume."""
     device: Annotated[str, Shown("DEVICE")] = "auto"
     """Where to train: auto, cpu, cuda, cuda:1, all, or numbers of GPUs such as 0,1."""
     engine: EngineName = "auto"
-    """Physics: native MuJoCo on the CPU, or MuJoCo Warp; auto is native without a GPU."""
     replicas: Annotated[int | None, Field(ge=1, le=10**5), Shown("N", "one per physical core")] = (
         None
     )

@@ -329,7 +329,7 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
         raise cannot_write(folder, error, "choose another `out`") from None
     with ExitStack() as held, new_folder(folder, replace=False) as temporary:
         # Held until the folder is in place: another process removes leftovers that nobody holds.
-        held.enter_context(lock(temporary, "draft train"))
+        held.enter_context(lock(temporary, "training"))
         for name, text in files.items():
             write(temporary / name, text)
     return Run(folder, plan)

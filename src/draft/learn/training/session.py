@@ -263,5 +263,5 @@ def train_on(
     check("mjlab", "learn")
     from draft.learn.training import launch
 
-    with lock(run.folder, "draft train"):
+    with lock(run.folder, "training"):
         return launch.train_slice(run, options, where, until, report)

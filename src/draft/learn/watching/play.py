@@ -18,7 +18,8 @@ from draft.errors import DraftError, suggest
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.machine import WARP
 from draft.learn.engine.worlds.simulate import make
-from draft.learn.policy.playback import SETTLING, Command, Outcome
+from draft.learn.policy.play_options import Command
+from draft.learn.policy.playback import SETTLING, Outcome
 from draft.learn.policy.scenery import dress
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from draft.learn.measuring.utilisation import CELL, CELLS
 from draft.metrics.capabilities import CAPABILITIES, RANKED
 from draft.study.report.records import Evaluation, Samples, Study, seeds_in_words
 from draft.study.report.spread import ARM_WORDS, by_seed
+from draft.values import Array
 
 # Largest range of the top speed over seeds, per its median.
 RANGE = 0.25
@@ -100,7 +101,7 @@ def largest_efficiency(one: Evaluation) -> float | None:
     Returns:
         The bound; None if samples of a joint class are missing.
     """
-    found = one.samples.get(SPEED, Samples()).plane
+    found: Mapping[str, Array] = {**one.samples.get(SPEED, Samples()).plane}
     if set(found) != set(CLASSES):
         return None
     low = CELL * np.arange(CELLS)

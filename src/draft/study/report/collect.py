@@ -11,8 +11,7 @@ from draft.errors import DraftError
 from draft.files import new_folder, write
 from draft.learn.task.stages import STAGES
 from draft.learn.training.run import differences
-from draft.study.report import collected as files
-from draft.study.report.gather import gather
+from draft.study.report import folder as files
 from draft.study.report.missing import missing
 from draft.study.report.records import Planned, Study, Trained
 from draft.study.store import FILE
@@ -59,9 +58,9 @@ def collect(source: Path, out: Path) -> Collected:
     target = out.resolve()
     old = _old(target)
     omitted: list[str] = []
-    new = _finished(gather(source), omitted)
+    new = _finished(files.read(source), omitted)
     if not new.singles:
-        remedy = "; ".join(omitted) or "resume it with 'draft study'"
+        remedy = "; ".join(omitted) or "resume the study"
         raise DraftError(f"'{source}' has no finished run", remedy)
     merged = _merged(old, new) if old else new
     _check_alike(merged, target)
@@ -90,7 +89,7 @@ def _old(target: Path) -> Study | None:
     if not target.exists():
         return None
     if files.is_results(target):
-        return files.read(target)
+        return files.read(target, results=True)
     if not target.is_dir() or any(target.iterdir()):
         cause = f"'{target}' exists and does not hold results of a study; it is kept"
         raise DraftError(cause, "choose another `out`")
@@ -107,17 +106,16 @@ def _finished(study: Study, omitted: list[str]) -> Study:
         if one.iterations < one.planned:
             done = f"{one.iterations} of {one.planned} iterations"
             omitted.append(f"{one.name} is not finished: {done}")
-        else:
-            runs.append(one)
-    evaluations = []
-    for one in study.evaluations:
-        at = one.summary.iteration
-        if one.run in runs and at not in (None, one.run.planned):
-            words = f"is of iteration {at:g}, not {one.run.planned}"
-            omitted.append(f"{one.run.name}, {one.name}: the evaluation {words}")
-        elif one.run in runs:
-            evaluations.append(one)
-    return replace(study, singles=tuple(runs), families=(), evaluations=tuple(evaluations))
+            continue
+        known = {}
+        for name, each in one.evaluations.items():
+            if each.summary.iteration in (None, one.planned):
+                known[name] = each
+            else:
+                words = f"is of iteration {each.summary.iteration:g}, not {one.planned}"
+                omitted.append(f"{one.name}, {name}: the evaluation {words}")
+        runs.append(one.model_copy(update={"evaluations": known}))
+    return replace(study, runs=tuple(runs))
 
 
 def _merged(old: Study, new: Study) -> Study:
@@ -126,27 +124,19 @@ def _merged(old: Study, new: Study) -> Study:
     A run that was not trained again keeps evaluations that the study lacks now, as while they are
     repeated with more replicas.
     """
-    runs = {one.name: one for one in old.singles} | {one.name: one for one in new.singles}
-    evaluations = {(one.run.name, one.name): one for one in new.evaluations}
-    before = {one.name: one for one in old.singles}
-    for one in old.evaluations:
-        run, kept = runs[one.run.name], (one.run.name, one.name)
-        if kept not in evaluations and _same_training(before[run.name], run):
-            evaluations[kept] = replace(one, run=run)
-    singles = sorted(runs.values(), key=lambda one: one.place)
-    ordered = [evaluations[key] for key in sorted(evaluations)]
+    runs = {one.name: one for one in old.runs}
+    for one in new.runs:
+        before = runs.get(one.name)
+        kept = before.evaluations if before and _same_training(before, one) else {}
+        evaluations = dict(sorted({**kept, **one.evaluations}.items()))
+        runs[one.name] = one.model_copy(update={"evaluations": evaluations})
     planned = _joined(old.planned, new.planned)
-    return replace(
-        new,
-        name=planned.name if planned else old.name,
-        singles=tuple(singles),
-        evaluations=tuple(ordered),
-        planned=planned,
-    )
+    name = planned.name if planned else old.name
+    return replace(new, name=name, runs=tuple(runs.values()), planned=planned)
 
 
 def _same_training(a: Trained, b: Trained) -> bool:
-    return (a.iterations, a.seconds, list(a.rows)) == (b.iterations, b.seconds, list(b.rows))
+    return (a.iterations, a.seconds, a.curve) == (b.iterations, b.seconds, b.curve)
 
 
 def _joined(old: Planned | None, new: Planned | None) -> Planned | None:
@@ -182,9 +172,10 @@ def _check_alike(study: Study, target: Path) -> None:
     robots: dict[str, Trained] = {}
     for one in study.singles:
         first = by_stage.setdefault(one.stage, one)
-        namesake = robots.setdefault(one.key[0], one)
-        differing = differences(_alike(first), _alike(one))
-        differing += differences(_numbers(study.singles[0]), _numbers(one))
+        namesake = robots.setdefault(one.design, one)
+        plans = [run.plan | {"iterations": run.planned} for run in (first, one)]
+        numbers = [{"config": run.plan["config"]} for run in (study.singles[0], one)]
+        differing = differences(*plans) + differences(*numbers)
         differing += ["robot"] * (namesake.robots != one.robots)
         if differing:
             what = ", ".join(name.replace("_", " ") for name in dict.fromkeys(differing[:6]))
@@ -192,17 +183,6 @@ def _check_alike(study: Study, target: Path) -> None:
             cause = f"run {one.name} is of another plan than {other.name} of '{target}': {what}"
             remedy = "choose another `out`, or delete the folder and collect anew"
             raise DraftError(f"{cause} differ; nothing was written", remedy)
-
-
-def _alike(one: Trained) -> dict[str, object]:
-    """Return what all runs of a stage share."""
-    settings = {name: one.plan[name] for name in files.StageFile.model_fields}
-    return settings | _numbers(one) | {"iterations": one.planned}
-
-
-def _numbers(one: Trained) -> dict[str, object]:
-    """Return the numbers of the tasks, which all runs share."""
-    return {"config": one.plan["config"]}
 
 
 def _text(path: Path) -> str | None:

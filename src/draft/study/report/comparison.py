@@ -120,7 +120,7 @@ def _choices(study: Study, other: Study) -> Iterator[str]:
         {stage: next((r for r in one.singles if r.stage == stage), None) for stage in STAGES}
         for one in (study, other)
     )
-    robots = [{one.key[0]: one.robots for one in each.singles} for each in (study, other)]
+    robots = [{one.design: one.robots for one in each.singles} for each in (study, other)]
     for design in study.members:
         if robots[1].get(design, robots[0][design]) != robots[0][design]:
             yield f"another robot {study.titles[design]}"

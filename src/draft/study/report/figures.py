@@ -96,12 +96,13 @@ def combined(study: Study, used: Utilisation) -> Iterator[Drawing]:
             yield Drawing(f"training_{stage}", "training", f"Training: stage {stage}", make)
 
 
-def shrink(path: Path, width: int | None = None) -> None:
+def shrink(path: Path, width: int | None = None, tints: int = TINTS) -> None:
     """Write a PNG again with a palette, which takes about a third.
 
     Args:
         path: the PNG.
         width: largest width [pixels]; None to keep it.
+        tints: number of colours.
     """
     from PIL import Image
 
@@ -110,5 +111,5 @@ def shrink(path: Path, width: int | None = None) -> None:
     if width is not None and image.width > width:
         image = image.resize((width, round(image.height * width / image.width)))
     data = BytesIO()
-    image.quantize(TINTS).save(data, "PNG", optimize=True)
+    image.quantize(tints).save(data, "PNG", optimize=True)
     write(path, data.getvalue())

@@ -42,7 +42,7 @@ class Line:
 def lines(study: Study) -> list[Line]:
     """Return the lines of designs by leg length, then of families."""
     found = [
-        Line(title, color(study, design), [one for one in study.singles if one.key[0] == design])
+        Line(title, color(study, design), [one for one in study.singles if one.design == design])
         for design, title in study.titles.items()
     ]
     groups: dict[str, list[Trained]] = {}
@@ -106,7 +106,8 @@ def _curves(line: Line, stage: str, name: str) -> list[tuple[Array, Array]]:
 
 def _curve(one: Trained, name: str) -> tuple[Array, Array]:
     """Return iterations and known values of a run."""
-    pairs = [(row["iteration"], row[name]) for row in one.rows if name in row]
+    columns = (one.curve.get(column, []) for column in ("iteration", name))
+    pairs = [pair for pair in zip(*columns, strict=False) if None not in pair]
     at, values = np.array(pairs, dtype=float).reshape(-1, 2).T
     return at, values
 

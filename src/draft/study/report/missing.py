@@ -22,7 +22,7 @@ def missing(study: Study) -> list[str]:
     designs = study.titles
     found: list[str] = []
     for design, title in designs.items():
-        own = [one for one in study.singles if one.key[0] == design]
+        own = [one for one in study.singles if one.design == design]
         found += _untrained(title, own, stages, seeds)
         found += _unmeasured(study, own, title)
     if plan:

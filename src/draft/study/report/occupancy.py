@@ -12,7 +12,7 @@ import numpy as np
 from draft.learn.bodies.legged import CLASSES
 from draft.learn.measuring.summary import Measured
 from draft.learn.measuring.utilisation import BINS, NEAR, QUANTITIES, percentile
-from draft.study.report.records import Evaluation, Samples, Study
+from draft.study.report.records import Evaluation, Samples, Study, levels_of
 
 TESTS = ("speed", "ascent", "descent", "push", "walk")
 
@@ -77,13 +77,14 @@ class Utilisation:
 def _use(test: str, evaluations: Sequence[Evaluation]) -> Use:
     pooled, levels = Samples(), []
     for one in evaluations:
-        if test in one.levels:
-            levels.append(one.levels[test])
+        level = levels_of(one.summary).get(test)
+        if level is not None:
+            levels.append(level)
             pooled.add(one.samples.get(test, Samples()))
     shares = {}
     for joint in CLASSES:
         for quantity in QUANTITIES:
-            counted = percentile(pooled.counts.get((joint, quantity), np.zeros(BINS)))
+            counted = percentile(pooled.bins.get(joint, {}).get(quantity, np.zeros(BINS)))
             if counted is not None:
                 shares[joint, quantity] = counted
                 continue

@@ -1,82 +1,155 @@
-"""Records of a study: trainings, evaluations and the plan."""
+"""Records of a study: trainings, evaluations and the plan, as `folder` reads and writes them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
+from pydantic.types import GetPydanticSchema
+from pydantic_core import core_schema
 
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.measuring.summary import ARMS, PROTOCOLS, Arm, Protocol, Summary
 from draft.learn.measuring.utilisation import BINS, CELLS
-from draft.learn.task.stages import STAGES
-from draft.learn.training.members import robots_digest
-from draft.learn.training.progress import Row
+from draft.learn.task.stages import STAGES, StageName
 from draft.values import Array
 
 Key = tuple[str, str, int]
+Joint = Literal["hip roll", "hip pitch", "knee"]
+Quantity = Literal["torque", "speed", "sum"]
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
+def _filled(counts: Sequence[int], length: int) -> Array:
+    if len(counts) > length:
+        raise ValueError("it counts more bins than there are")
+    return np.pad(np.array(counts, dtype=float), (0, length - len(counts)))
+
+
+def _cut(counts: Array) -> list[int]:
+    return [int(count) for count in np.trim_zeros(counts, "b")]
+
+
+def _cells(rows: Sequence[Sequence[int]]) -> Array:
+    return np.array([_filled(row, CELLS) for row in rows]).reshape(CELLS, CELLS)
+
+
+def _stored(integers: core_schema.CoreSchema, read: Any, write: Any) -> GetPydanticSchema:
+    """Array that a file holds as whole numbers, without trailing zeros."""
+    text = core_schema.plain_serializer_function_ser_schema(write)
+    schema = core_schema.no_info_after_validator_function(read, integers, serialization=text)
+    return GetPydanticSchema(lambda *_: schema)
+
+
+_INTEGERS = core_schema.list_schema(core_schema.int_schema())
+Bins = Annotated[Array, _stored(_INTEGERS, lambda counts: _filled(counts, BINS), _cut)]
+Cells = Annotated[
+    Array,
+    _stored(core_schema.list_schema(_INTEGERS), _cells, lambda cells: [*map(_cut, cells)]),
+]
+
+
+class Record(BaseModel):
+    """Part of a file of results; unknown keys and infinite numbers are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Samples(Record):
     """Counted samples of a skill test at the level of its utilisation.
 
     Attributes:
-        counts: samples by bin, shape (BINS,), by joint class and quantity.
+        bins: samples by bin, shape (BINS,), by joint class and quantity.
         plane: samples by cell of torque and speed, shape (CELLS, CELLS), by joint class.
     """
 
-    counts: dict[tuple[str, str], Array] = field(default_factory=dict)
-    plane: dict[str, Array] = field(default_factory=dict)
+    bins: dict[Joint, dict[Quantity, Bins]] = Field(default_factory=dict)
+    plane: dict[Joint, Cells] = Field(default_factory=dict)
 
     def add(self, other: Samples) -> None:
         """Add the samples of another evaluation."""
-        for key, counts in other.counts.items():
-            self.counts[key] = self.counts.get(key, np.zeros(BINS)) + counts
+        for joint, by_quantity in other.bins.items():
+            own = self.bins.setdefault(joint, {})
+            for quantity, counts in by_quantity.items():
+                own[quantity] = own.get(quantity, 0) + counts
         for joint, cells in other.plane.items():
-            self.plane[joint] = self.plane.get(joint, np.zeros((CELLS, CELLS))) + cells
+            self.plane[joint] = self.plane.get(joint, 0) + cells
 
 
-@dataclass(frozen=True, eq=False)
-class Trained:
-    """A run and its training.
+class Outcome(Record):
+    """Summary of an evaluation, with its counted samples by test.
+
+    There are samples of the nominal arm of one design.
+    """
+
+    summary: Summary
+    samples: dict[str, Samples]
+
+    @property
+    def arm(self) -> Arm:
+        """Arm: "nominal" or "perturbed"."""
+        return self.summary.arm
+
+    @property
+    def protocol(self) -> Protocol:
+        """Protocol: "walking" or "published"."""
+        return self.summary.protocol
+
+    @property
+    def name(self) -> str:
+        """Name of its folder within the run."""
+        return f"{self.arm}-{self.protocol}"
+
+
+class Trained(Record):
+    """A run: its training and its evaluations.
 
     Attributes:
         name: name of its folder.
-        members: its robots.
-        plan: record of its plan, see `run.Plan.record`, without robots and origin.
+        design: name of its first robot.
+        stage: stage of the training.
+        seed: seed of the training.
+        robots: hash of its robots.
         planned: iterations that were planned.
         iterations: iterations done.
         seconds: time of training [s]; None if unknown.
         engine: physics engine; None if unknown.
         processes: processes that shared the training; None if unknown.
         versions: versions of the packages at its start.
-        rows: curve of its training, see `draft.learn.training.progress.thin`.
+        curve: curve of its training by column, see `draft.learn.training.progress.thin`.
+        evaluations: its evaluations by arm and protocol.
+        members: its robots, which have files of their own.
+        plan: what all runs of its stage share, see `run.Plan.record`.
     """
 
-    name: str
-    members: tuple[LeggedRobot, ...]
-    plan: Mapping[str, Any]
-    planned: int
-    iterations: int
+    format: Literal[1]
+    name: str = Field(alias="run")
+    design: str
+    stage: StageName
+    seed: int
+    robots: str
+    planned: int = Field(ge=0)
+    iterations: int = Field(ge=0)
     seconds: float | None
     engine: str | None
     processes: int | None
-    versions: Mapping[str, str]
-    rows: Sequence[Row]
+    versions: dict[str, str]
+    curve: dict[str, list[float | None]]
+    evaluations: dict[str, Outcome]
+    members: Annotated[tuple[LeggedRobot, ...], PlainValidator(tuple)] = Field((), exclude=True)
+    plan: dict[str, Any] = Field({}, exclude=True)
 
-    @property
-    def stage(self) -> str:
-        """Stage of the training."""
-        return self.plan["stage"]
-
-    @property
-    def seed(self) -> int:
-        """Seed of the training."""
-        return self.plan["seed"]
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if len({len(values) for values in self.curve.values()}) > 1:
+            raise ValueError("curve: its columns differ in length")
+        for name, one in self.evaluations.items():
+            if name != one.name:
+                raise ValueError(f"evaluations.{name}: it is of {one.name}")
+        return self
 
     @property
     def environments(self) -> int:
@@ -96,64 +169,35 @@ class Trained:
     @property
     def key(self) -> Key:
         """Design, stage and seed."""
-        return self.members[0].name, self.stage, self.seed
+        return self.design, self.stage, self.seed
 
     @property
     def place(self) -> tuple[str, int, int]:
         """Place among other runs: by design, stage and seed."""
-        return self.members[0].name, list(STAGES).index(self.stage), self.seed
+        return self.design, list(STAGES).index(self.stage), self.seed
 
     @property
     def single(self) -> bool:
         """Whether it has one design."""
         return len(self.members) == 1
 
-    @cached_property
-    def robots(self) -> str:
-        """Hash of its robots."""
-        return robots_digest(self.members)
 
-
-@dataclass(frozen=True, eq=False)
-class Evaluation:
-    """One arm and protocol of a run's evaluation.
-
-    Attributes:
-        run: the run.
-        summary: its summary.
-        samples: its counted samples by test, if it is of the nominal arm and one design.
-    """
+class Evaluation(Outcome):
+    """One arm and protocol of a run's evaluation, with the run."""
 
     run: Trained
-    summary: Summary
-    samples: Mapping[str, Samples] = field(default_factory=dict)
 
-    @property
-    def arm(self) -> Arm:
-        """Arm: "nominal" or "perturbed"."""
-        return self.summary.arm
 
-    @property
-    def protocol(self) -> Protocol:
-        """Protocol: "walking" or "published"."""
-        return self.summary.protocol
-
-    @property
-    def name(self) -> str:
-        """Name of its folder within the run."""
-        return f"{self.arm}-{self.protocol}"
-
-    @property
-    def levels(self) -> dict[str, float]:
-        """Level of the utilisation by test, of the tests that have one."""
-        found = {}
-        for test in self.summary.utilisation:
-            level = self.summary.utilisation_level.get(test)
-            if level is None and test == "speed":
-                level = self.summary.scalars.get("peak_command")
-            if level is not None:
-                found[test] = level
-        return found
+def levels_of(summary: Summary) -> dict[str, float]:
+    """Return the level of the utilisation by test, of the tests that have one."""
+    found = {}
+    for test in summary.utilisation:
+        level = summary.utilisation_level.get(test)
+        if level is None and test == "speed":
+            level = summary.scalars.get("peak_command")
+        if level is not None:
+            found[test] = level
+    return found
 
 
 @dataclass(frozen=True)
@@ -195,19 +239,35 @@ class Study:
 
     Attributes:
         name: name of the study, or of its folder.
-        singles: runs of one design.
-        families: runs of several designs.
-        evaluations: evaluations of the runs.
+        runs: its runs.
         warnings: what was omitted, and why.
         planned: plan; None if unknown, as in a folder of single runs.
     """
 
     name: str
-    singles: tuple[Trained, ...]
-    families: tuple[Trained, ...]
-    evaluations: tuple[Evaluation, ...]
+    runs: tuple[Trained, ...]
     warnings: tuple[str, ...]
     planned: Planned | None
+
+    @cached_property
+    def singles(self) -> tuple[Trained, ...]:
+        """Runs of one design, by design, stage and seed."""
+        return tuple(sorted((one for one in self.runs if one.single), key=lambda one: one.place))
+
+    @cached_property
+    def families(self) -> tuple[Trained, ...]:
+        """Runs of several designs, likewise."""
+        many = (one for one in self.runs if not one.single)
+        return tuple(sorted(many, key=lambda one: one.place))
+
+    @cached_property
+    def evaluations(self) -> tuple[Evaluation, ...]:
+        """Evaluations of the runs, by name."""
+        return tuple(
+            Evaluation(run=run, summary=one.summary, samples=one.samples)
+            for run in sorted(self.runs, key=lambda run: run.name)
+            for one in run.evaluations.values()
+        )
 
     @property
     def members(self) -> dict[str, LeggedRobot]:
@@ -228,7 +288,7 @@ class Study:
         """Return the title of a run's design, or "family of N"."""
         if not run.single:
             return f"family of {len(run.members)}"
-        return self.titles.get(run.key[0], run.key[0])
+        return self.titles.get(run.design, run.design)
 
     @property
     def seeds(self) -> list[int]:

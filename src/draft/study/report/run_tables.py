@@ -8,6 +8,7 @@ from typing import Any
 
 from draft.learn.measuring.summary import Summary
 from draft.learn.task.stages import STAGES
+from draft.study.jobs import evaluation_job
 from draft.study.report import errors
 from draft.study.report.records import Evaluation, Study, Trained, seeds_in_words
 from draft.study.report.spread import ARM_WORDS, UNKNOWN, few, spread
@@ -133,7 +134,7 @@ def provenance(study: Study) -> Table | None:
         groups.setdefault(_made(one, own, recipe), []).append(one)
     rows: list[list[Cell]] = [
         [
-            ", ".join(t for d, t in study.titles.items() if d in {one.key[0] for one in runs}),
+            ", ".join(t for d, t in study.titles.items() if d in {one.design for one in runs}),
             ", ".join(s for s in STAGES if s in {one.stage for one in runs}),
             ", ".join(map(str, sorted({one.seed for one in runs}))),
             len(runs),
@@ -181,7 +182,10 @@ def spent(study: Study) -> Table | None:
                     _jobs(study, [one.name for one in runs]),
                     len(own),
                     _hours(one.summary.took_s for one in own),
-                    _jobs(study, [_job(one) for one in own]),
+                    _jobs(
+                        study,
+                        [evaluation_job(one.run.name, one.arm, one.protocol) for one in own],
+                    ),
                 ]
             )
     columns = [Column("stage"), Column("runs"), Column("steps", "million", 1)]
@@ -192,11 +196,6 @@ def spent(study: Study) -> Table | None:
         "loading of libraries and the compilation of models."
     )
     return Table("spent", caption, columns, rows)
-
-
-def _job(one: Evaluation) -> str:
-    """Return the name of the job of an evaluation; see `draft.study.graph`."""
-    return f"{one.run.name}-{one.arm}" + "-published" * (one.protocol == "published")
 
 
 def _jobs(study: Study, names: Iterable[str]) -> Cell:

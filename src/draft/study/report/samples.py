@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from itertools import product
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,6 @@ from draft.learn.bodies.legged import CLASSES
 from draft.learn.measuring.results import OCCUPANCY, UTILISATION
 from draft.learn.measuring.utilisation import BINS, CELLS, QUANTITIES
 from draft.study.report.records import Samples
-from draft.values import Array
 
 COLUMNS = {
     UTILISATION: ("test", "level", "joint", "quantity", "bin", "count"),
@@ -25,26 +23,35 @@ BEFORE = {"test": "battery"}  # Names of columns that an older Draft wrote.
 Columns = dict[str, Any]
 
 
-def read(folder: Path, levels: Mapping[str, float]) -> tuple[dict[str, Samples], list[str]]:
-    """Read the counted samples of an evaluation.
+def read(folder: Path, levels: Mapping[str, float], warnings: list[str]) -> dict[str, Samples]:
+    """Read the counted samples of an evaluation by test; those of a test without any are omitted.
 
     Args:
         folder: folder of the evaluation.
         levels: level to read, by test.
-
-    Returns:
-        Samples by test, and warnings about files that cannot be read.
+        warnings: gets what is said of files that cannot be read.
 
     Raises:
         DraftError: the extra that reads Parquet is not installed.
     """
-    warnings: list[str] = []
-    tables = {name: _table(folder / name, warnings) for name in COLUMNS}
+    tables = {name: _table(folder / name, warnings) for name in COLUMNS if levels}
     found = {}
     for test, level in levels.items():
-        counts = dict(_counts(tables[UTILISATION], test, level))
-        found[test] = Samples(counts, dict(_cells(tables[OCCUPANCY], test, level)))
-    return found, warnings
+        bins: dict[Any, Any] = {}
+        for joint in CLASSES:
+            for quantity in QUANTITIES:
+                at = {"joint": joint, "quantity": quantity, "test": test, "level": level}
+                if counts := _total(tables[UTILISATION], at, {"bin": BINS}):
+                    bins.setdefault(joint, {})[quantity] = counts
+        axes = {"torque": CELLS, "speed": CELLS}
+        cells = {
+            joint: _total(tables[OCCUPANCY], {"joint": joint, "test": test, "level": level}, axes)
+            for joint in CLASSES
+        }
+        plane = {joint: counts for joint, counts in cells.items() if counts}
+        if bins or plane:
+            found[test] = Samples.model_validate({"bins": bins, "plane": plane})
+    return found
 
 
 def _table(path: Path, warnings: list[str]) -> Columns | None:
@@ -74,36 +81,21 @@ def _column(name: str, column: Any) -> Any:
     return column.cast(kind).to_numpy(zero_copy_only=False)
 
 
-def _counts(
-    table: Columns | None, test: str, level: float
-) -> Iterator[tuple[tuple[str, str], Array]]:
-    """Yield the samples by bin of each joint class and quantity."""
-    if table is not None:
-        at = _at(table, test, level)
-        for joint, quantity in product(CLASSES, QUANTITIES):
-            rows = at & (table["joint"] == joint) & (table["quantity"] == quantity)
-            if rows.any():
-                yield (joint, quantity), _total(table, rows, {"bin": BINS})
+def _total(table: Columns | None, at: Mapping[str, Any], axes: Mapping[str, int]) -> list[Any]:
+    """Return the counts of rows by bins, none without a row; those out of range are at the ends.
 
-
-def _cells(table: Columns | None, test: str, level: float) -> Iterator[tuple[str, Array]]:
-    """Yield the samples by torque and speed of each joint class, shape (cells, cells)."""
-    if table is not None:
-        at = _at(table, test, level)
-        for joint in CLASSES:
-            rows = at & (table["joint"] == joint)
-            if rows.any():
-                yield joint, _total(table, rows, {"torque": CELLS, "speed": CELLS})
-
-
-def _total(table: Columns, rows: Array, axes: Mapping[str, int]) -> Array:
-    """Return the counts of rows by bins; those out of range are in the first or last."""
-    places = tuple(np.clip(table[name][rows].astype(int), 0, n - 1) for name, n in axes.items())
-    total = np.zeros(tuple(axes.values()))
+    Args:
+        table: columns of a file of counts.
+        at: values of the rows by column.
+        axes: number of bins by column.
+    """
+    if table is None:
+        return []
+    masks = [abs(table[n] - x) < 1e-6 if n == "level" else table[n] == x for n, x in at.items()]
+    rows = np.logical_and.reduce(masks)
+    if not rows.any():
+        return []
+    places = tuple(np.clip(table[name][rows], 0, n - 1) for name, n in axes.items())
+    total = np.zeros(tuple(axes.values()), dtype=np.int64)
     np.add.at(total, places, table["count"][rows])
-    return total
-
-
-def _at(table: Columns, test: str, level: float) -> Array:
-    """Return the mask of the rows of a test's level."""
-    return (table["test"] == test) & (np.abs(table["level"] - level) < 1e-6)
+    return total.tolist()

@@ -23,7 +23,6 @@ from draft.study.report.blocks import (
     Pictures,
     Section,
 )
-from draft.study.report.collected import study_command
 from draft.study.report.learning import lines
 from draft.study.report.missing import missing
 from draft.study.report.records import Study, seeds_in_words
@@ -33,7 +32,6 @@ from draft.study.report.table import Table
 from draft.study.report.tables import of_skill
 
 STRIPS = "strips"
-_SURFACE = ["draft surface", "ROBOT", "--policy", "RUN"]  # its command line
 # Name of a policy by its stage, as in the file names of strips.
 WORDS = {stage: skill for skill, stage in policy.SKILLS.items()}
 TOY = "This is the toy of a study: it shows that all of it runs, and nothing about the designs."
@@ -62,19 +60,13 @@ class Source:
         folder: folder of the results; its `strips/` are shown.
         page: file of the page.
         beside: comparisons with other results, by folder.
+        commands: command lines that repeat the study, of which the last one writes the page.
     """
 
     folder: Path
     page: Path
     beside: Mapping[Path, Table]
-
-    def command(self) -> str:
-        """Return the command that writes the page."""
-        page = os.path.relpath(self.page)
-        named = self.page.name if page.startswith("..") else Path(page).as_posix()
-        others = [*map(_place, self.beside)]
-        against = ["--against", *others] if others else []
-        return study_command(["results", _place(self.folder), *against, "--write", named])
+    commands: Sequence[str]
 
 
 class Contents:
@@ -103,7 +95,7 @@ class Contents:
         comment, last = "", "What was run"
         if self.source is not None:
             title = f"Results: {self.study.name.replace('_', ' ')}"
-            comment = f"Written by `{self.source.command()}`; do not edit."
+            comment = f"Written by `{self.source.commands[-1]}`; do not edit."
             last = "How to redo it"
         found = (
             Section("robots", "Robots", self._pictures("robots")),
@@ -127,7 +119,7 @@ class Contents:
 
     def _about(self) -> Iterator[Block]:
         study, planned = self.study, self.study.planned
-        runs = (*study.singles, *study.families)
+        runs = study.runs
         words = []
         if study.members:
             words.append(f"Designs: {', '.join(study.titles.values())}")
@@ -227,7 +219,8 @@ class Contents:
         if self.study.families:
             runs = ", ".join(one.name for one in self.study.families)
             yield Paragraph(
-                f"Runs of families: {runs}. Their figures are those of `{' '.join(_SURFACE)}`."
+                f"Runs of families: {runs}. Their figures are those of `draft surface ROBOT` with "
+                "the run as its policy."
             )
 
     def _utilisation(self) -> Iterator[Block]:
@@ -276,16 +269,10 @@ class Contents:
 
     def _conditions(self) -> Iterator[Block]:
         if self.source:
-            study, planned, place = self.study, self.study.planned, _place(self.source.folder)
-            file = self.source.folder / f"{study.name}.yaml"
-            toy = ["--toy"] if planned and planned.toy else []
-            made = f"studies/{study.name}{'-toy' * bool(toy)}"
-            first = study_command([f"{place}/{file.name}", *toy])
-            first += f"   # to {made}, in slices if need be"
-            collect = study_command(["collect", made, "--out", place])
-            yield Commands([*[first] * file.is_file(), collect, self.source.command()])
-            whose = "; ".join(errors.WORDS[source] for source in errors.sources(study))
+            yield Commands(self.source.commands)
+            whose = "; ".join(errors.WORDS[source] for source in errors.sources(self.study))
             whose = f" Inertia errors: {whose}." if whose else ""
+            place = place_of(self.source.folder)
             words = f"All numbers, curves and counts are in `{place}`, as plain text.{whose}"
             yield Paragraph(words)
         yield from self._tables("provenance", "versions", "evaluations")
@@ -298,7 +285,7 @@ class Contents:
         return [Pictures(found)] if found else []
 
 
-def _place(folder: Path) -> str:
+def place_of(folder: Path) -> str:
     """Return the path of a results folder for a command in the current folder."""
     relative = os.path.relpath(folder)
     return folder.resolve().name if relative.startswith("..") else Path(relative).as_posix()

@@ -16,7 +16,7 @@ from draft.study.report import figures, robots
 from draft.study.report.blocks import Picture
 from draft.study.report.comparison import comparison
 from draft.study.report.figures import Drawing
-from draft.study.report.gather import gather
+from draft.study.report.folder import read
 from draft.study.report.html import html
 from draft.study.report.markdown import markdown
 from draft.study.report.occupancy import Utilisation
@@ -51,7 +51,7 @@ def write(study: Path, out: Path | None = None) -> Path:
     need("matplotlib", "figures")
     target = (out or study / "report").resolve()
     _check_target(target)
-    found = gather(study)
+    found = read(study)
     with new_folder(target) as temporary:
         _fill(found, temporary)
     return target / PAGE
@@ -100,7 +100,11 @@ def _check_target(target: Path) -> None:
 
 
 def write_page(
-    study: Study, folder: Path, page: Path, others: Mapping[Path, Study] | None = None
+    study: Study,
+    folder: Path,
+    page: Path,
+    commands: Sequence[str],
+    others: Mapping[Path, Study] | None = None,
 ) -> list[Path]:
     """Write a page of Markdown, and its figures to `images/NAME/` beside it.
 
@@ -108,6 +112,7 @@ def write_page(
         study: the results.
         folder: folder of the results; its `strips/` are linked.
         page: the page, NAME.md.
+        commands: command lines that repeat the study, of which the last one writes the page.
         others: results to compare with, by folder, see `draft.study.report.comparison`.
 
     Returns:
@@ -128,7 +133,7 @@ def write_page(
         for path in found:
             figures.shrink(path)
     pictures = _pictures(drawings, images, "png")
-    source = Source(folder, page, beside)
+    source = Source(folder, page, beside, commands)
     contents = Contents(study, all_tables(study, used), pictures, source)
     write_file(page, markdown(contents.page(), page.parent))
     return [page, *(images / path.name for path in found)]

@@ -9,7 +9,8 @@ import pytest
 pytest.importorskip("mjlab")
 import torch
 
-from tests.learn.task.states import each, place, roots, turn
+from draft.learn.task.mdp.commands import command_term as term
+from tests.learn.task.states import each, place, turn
 
 FORWARD, SIDEWAYS, TURN = (
     (1.0, 1.241639, 1.645701),
@@ -20,48 +21,39 @@ LIMIT = 0.5 * 1.77356  # Half the giraffe's estimated top speed [m/s].
 DRAWS = 400
 
 
-def term(env: Any) -> Any:
-    return env.command_manager.get_term("twist")
-
-
 def drawn(env: Any) -> dict[str, torch.Tensor]:
     """Many draws for every world: commands, and what kind each is."""
     command, ids = term(env), torch.arange(env.num_envs)
-    found: dict[str, list[torch.Tensor]] = {
-        "value": [],
-        "standing": [],
-        "heading": [],
-        "forward": [],
-        "target": [],
+    names = {
+        "value": "vel_command_b",
+        "standing": "is_standing_env",
+        "heading": "is_heading_env",
+        "forward": "is_forward_env",
+        "target": "heading_target",
     }
+    found: dict[str, list[torch.Tensor]] = {name: [] for name in names}
     torch.manual_seed(1)
     for _ in range(DRAWS):
         command._resample_command(ids)
-        found["value"].append(command.vel_command_b.clone())
-        found["standing"].append(command.is_standing_env.clone())
-        found["heading"].append(command.is_heading_env.clone())
-        found["forward"].append(command.is_forward_env.clone())
-        found["target"].append(command.heading_target.clone())
+        for name, attribute in names.items():
+            found[name].append(getattr(command, attribute).clone())
     return {name: torch.stack(values) for name, values in found.items()}
 
 
-def largest(env: Any, *of_designs: tuple[float, ...]) -> torch.Tensor:
-    return torch.stack([each(env, values) for values in of_designs], dim=1)
-
-
-def test_ranges_of_the_base_stage_grow_with_the_design(base: Any) -> None:
-    expected = largest(base, FORWARD, SIDEWAYS, TURN)
-    torch.testing.assert_close(term(base).range_now(), expected, atol=1e-4, rtol=0)
-    torch.testing.assert_close(term(base).held_share, torch.ones(base.num_envs))
-
-
-def test_on_hard_ground_half_the_top_speed_holds_the_giraffe_alone(terrain: Any) -> None:
+def test_ranges_of_commands_by_stage(base: Any, terrain: Any, push: Any) -> None:
+    # Those of the base stage grow with the design; on hard ground half the top speed holds the
+    # giraffe alone; those of the push stage are the same for all.
     held = (FORWARD[0], FORWARD[1], LIMIT)
     sideways = (SIDEWAYS[0], SIDEWAYS[1], 0.6 * LIMIT)
-    expected = largest(terrain, held, sideways, TURN)
-    torch.testing.assert_close(term(terrain).range_now(), expected, atol=5e-4, rtol=0)
-    shares = each(terrain, (1.0, 1.0, LIMIT / FORWARD[2]))
-    torch.testing.assert_close(term(terrain).held_share, shares, atol=5e-4, rtol=0)
+    for env, expected, share, tolerance in (
+        (base, (FORWARD, SIDEWAYS, TURN), (1.0, 1.0, 1.0), 1e-4),
+        (terrain, (held, sideways, TURN), (1.0, 1.0, LIMIT / FORWARD[2]), 5e-4),
+        (push, ((1.0,) * 3, (0.6,) * 3, (0.5,) * 3), (1.0, 1.0, 1.0), 1e-6),
+    ):
+        largest = torch.stack([each(env, values) for values in expected], dim=1)
+        torch.testing.assert_close(term(env).range_now(), largest, atol=tolerance, rtol=0)
+        torch.testing.assert_close(term(env).held_share, each(env, share), atol=tolerance, rtol=0)
+    torch.testing.assert_close(term(base).held_share, torch.ones(base.num_envs))
 
 
 @pytest.mark.parametrize(
@@ -78,11 +70,6 @@ def test_commands_of_the_velocity_stage_grow_at_their_steps(
     value = drawn(velocity)["value"][..., 0].abs()
     assert value.max() <= 15 * share
     assert value.max() > 0.99 * 15 * share
-
-
-def test_commands_of_the_push_stage_are_the_same_for_all(push: Any) -> None:
-    expected = torch.tensor([1.0, 0.6, 0.5]).expand(push.num_envs, 3)
-    torch.testing.assert_close(term(push).range_now(), expected)
 
 
 def test_commands_fill_their_range_and_never_leave_it(base: Any) -> None:
@@ -160,7 +147,3 @@ def test_a_reset_draws_for_its_worlds_and_returns_their_mean_error(flat: Any) ->
     others = [i for i in range(flat.num_envs) if i not in (2, 7)]
     torch.testing.assert_close(command.command[others], before[others])
     assert (command.command[ids] != before[ids]).any(1).all()
-
-
-def test_the_scale_of_a_world_is_that_of_its_design(flat: Any) -> None:
-    torch.testing.assert_close(flat.scene["robot"].leg_scale, roots(flat) ** 2)

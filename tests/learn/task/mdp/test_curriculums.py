@@ -8,26 +8,13 @@ import pytest
 
 pytest.importorskip("mjlab")
 import torch
-from hypothesis import given
-from hypothesis import strategies as st
 
 from draft.learn.engine.worlds.ranks import Ranks
-from draft.learn.task.config import Config
-from draft.learn.task.constants import ramp_at
-from draft.learn.task.groups import Ramp
 from draft.learn.task.mdp import curriculums
 from draft.learn.training.ppo.log import Tally
-from tests.learn.task.states import ask, roots
+from tests.learn.task.states import ask, place, roots
 
 ALONE = Ranks(0, 1, "cpu")
-RAMPS = (Config().velocity.ramp, Config().push.ramp)
-
-
-@given(st.sampled_from(RAMPS), st.integers(0, 5000))
-def test_a_ramp_has_the_value_of_its_last_step(ramp: Ramp, iteration: int) -> None:
-    starts = [start for start, _ in ramp]
-    before = max(start for start in starts if start <= iteration)
-    assert ramp_at(ramp, iteration) == dict(ramp)[before]
 
 
 @pytest.mark.parametrize(
@@ -70,13 +57,10 @@ def climbing(terrain: Any) -> Any:
 
 def walk(env: Any, way: Any) -> None:
     """Put the robots some way [m] from their patch's origin."""
-    place = env.scene.env_origins.clone()
-    place[:, 0] += 0.6 * torch.as_tensor(way)
-    place[:, 1] -= 0.8 * torch.as_tensor(way)
-    robot = env.scene["robot"]
-    home = torch.tensor([1.0, 0.0, 0.0, 0.0]).expand(env.num_envs, 4)
-    robot.write_root_link_pose_to_sim(torch.cat((place, home), dim=1))
-    env.sim.forward()
+    at = env.scene.env_origins.clone()
+    at[:, 0] += 0.6 * torch.as_tensor(way)
+    at[:, 1] -= 0.8 * torch.as_tensor(way)
+    place(env, at)
 
 
 def climb(env: Any) -> torch.Tensor:
@@ -130,20 +114,14 @@ def test_the_first_reset_moves_no_robot(climbing: Any) -> None:
         assert (climb(climbing) == 4).all()
 
 
-def test_a_robot_starts_on_the_patch_of_its_new_row(climbing: Any) -> None:
-    walk(climbing, 5.0)
-    climb(climbing)
-    terrain = climbing.scene.terrain
-    torch.testing.assert_close(
-        climbing.scene.env_origins, terrain.terrain_origins[5, terrain.terrain_types]
-    )
-
-
-def test_only_worlds_that_restart_move(climbing: Any) -> None:
+def test_worlds_that_restart_begin_on_the_patch_of_their_new_row(climbing: Any) -> None:
     walk(climbing, 5.0)
     curriculums.rows(climbing, torch.tensor([3, 8]), promotion=4.0, demotion=0.5)
-    rows = climbing.scene.terrain.terrain_levels.tolist()
-    assert rows == [5 if i in (3, 8) else 4 for i in range(climbing.num_envs)]
+    terrain = climbing.scene.terrain
+    rows = terrain.terrain_levels
+    assert rows.tolist() == [5 if i in (3, 8) else 4 for i in range(climbing.num_envs)]
+    at = terrain.terrain_origins[rows, terrain.terrain_types]
+    torch.testing.assert_close(climbing.scene.env_origins, at)
 
 
 def test_the_log_has_the_mean_row(climbing: Any) -> None:
@@ -154,7 +132,7 @@ def test_the_log_has_the_mean_row(climbing: Any) -> None:
     assert float(found) == pytest.approx(float(terrain.terrain_types.float().mean()))
 
 
-def test_the_log_has_the_hardest_row_of_a_robot_on_stairs(climbing: Any) -> None:
+def test_the_log_has_the_hardest_row_of_a_robot_on_stairs(climbing: Any, flat: Any) -> None:
     patches = list(climbing.scene.terrain.cfg.terrain_generator.sub_terrains)
     kinds = [patches[i] for i in climbing.scene.terrain.terrain_types.tolist()]
     on_stairs = [i for i, kind in enumerate(kinds) if kind.startswith("stairs")]
@@ -162,7 +140,4 @@ def test_the_log_has_the_hardest_row_of_a_robot_on_stairs(climbing: Any) -> None
     climbing.scene.terrain.terrain_levels[off] = 9
     climbing.scene.terrain.terrain_levels[on_stairs[0]] = 6
     assert Tally(climbing, ALONE)._hardest_row().tolist() == [6.0]
-
-
-def test_without_stairs_there_is_no_row_to_log(flat: Any) -> None:
-    assert Tally(flat, ALONE)._hardest_row().tolist() == []
+    assert Tally(flat, ALONE)._hardest_row().tolist() == []  # There are no stairs.

@@ -18,6 +18,12 @@ LEVEL, YAWED, TILTED = (1.0, 0.0, 0.0, 0.0), turn("z", 1.3), turn("x", 0.8)
 MOST = torch.tensor([0.5, 0.5, 0.4, 0.52, 0.52, 0.78])
 
 
+def largest(env: Any) -> torch.Tensor:
+    """Largest pushes: velocities grow with the square root of the size, rates shrink."""
+    power = torch.tensor([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
+    return MOST * roots(env)[:, None] ** power
+
+
 def pushes(env: Any) -> tuple[Any, dict[str, Any]]:
     """The term that pushes, and its parameters."""
     term = env.event_manager.get_term_cfg("push")
@@ -60,16 +66,13 @@ def test_a_push_adds_the_drawn_share_of_the_largest(
 ) -> None:
     place(flat, (0, 0, 3), TILTED)
     monkeypatch.setattr(events.torch, "rand_like", lambda like: torch.full_like(like, drawn))
-    power = torch.tensor([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
-    largest = MOST * roots(flat)[:, None] ** power
-    torch.testing.assert_close(pushed(flat), (2 * drawn - 1) * largest, atol=1e-5, rtol=0)
+    expected = (2 * drawn - 1) * largest(flat)
+    torch.testing.assert_close(pushed(flat), expected, atol=1e-5, rtol=0)
 
 
 def test_pushes_fill_their_range_and_never_leave_it(flat: Any) -> None:
     place(flat, (0, 0, 3), YAWED)
-    power = torch.tensor([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
-    largest = MOST * roots(flat)[:, None] ** power
-    share = torch.cat([pushed(flat) / largest for _ in range(60)])
+    share = torch.cat([pushed(flat) / largest(flat) for _ in range(60)])
     assert share.abs().max() < 1 + 1e-4
     assert (share.max(0).values > 0.95).all()
     assert (share.min(0).values < -0.95).all()
@@ -88,8 +91,8 @@ def test_pushes_of_the_push_stage_grow_alike_for_all_designs(
     monkeypatch.setattr(events.torch, "rand_like", torch.ones_like)
     for step in (24 * iteration, 24 * iteration + 23):
         push.common_step_counter = step
-        largest = (factor * MOST).expand(push.num_envs, 6)
-        torch.testing.assert_close(pushed(push), largest, atol=1e-4, rtol=0)
+        expected = (factor * MOST).expand(push.num_envs, 6)
+        torch.testing.assert_close(pushed(push), expected, atol=1e-4, rtol=0)
 
 
 @pytest.mark.parametrize(("stage", "low", "high"), [("flat", 2.0, 5.0), ("push", 1.0, 3.0)])

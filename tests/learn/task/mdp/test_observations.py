@@ -120,11 +120,3 @@ def test_the_critic_sees_contact_its_time_and_the_logarithm_of_its_force(flat: A
 def test_the_scan_is_clipped_at_its_range(flat: Any) -> None:
     place(flat, (0, 0, 9))
     assert (seen(flat, "critic")["height_scan"] == 1.0).all()
-
-
-def test_a_policy_may_observe_the_features_of_its_design(build: Any) -> None:
-    env = build(3, ground="flat", see_design=True)
-    assert env.observation_manager.group_obs_dim == {"actor": (250,), "critic": (274,)}
-    design = env.obs_buf["actor"][:, -15:]
-    logs = torch.tensor([1.0, 1.5416667, 2.7083333]).log()
-    torch.testing.assert_close(design[:, 0], logs, atol=1e-5, rtol=0)

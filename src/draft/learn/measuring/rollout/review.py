@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Maker = Callable[[ManagerBasedRlEnv], Policy]
 
-REPLICAS, SECONDS = 64, 8.0
+REPLICAS, SECONDS, SETTLE = 64, 8.0, 2.0
 STEPS, KICKS = (0.05, 0.10), (1.0, 3.0)
 # Share of the commanded distance at which a robot that stays up has crossed the stairs.
 CROSSED = 0.6
@@ -108,7 +108,7 @@ def _trial(run: Run, replicas: int) -> Trial:
     task = task_of(run.plan)
     # Draws fill the region evenly from the first on.
     task = replace(task, members=task.members[:replicas])
-    return Trial(task, tuple(chosen), replicas, seconds=SECONDS)
+    return Trial(task, tuple(chosen), replicas, SECONDS, SETTLE)
 
 
 def levels(policy: Maker, trial: Trial, device: str, engine: str) -> list[Level]:

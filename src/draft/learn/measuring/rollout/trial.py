@@ -14,14 +14,7 @@ from mjlab.managers.event_manager import EventTermCfg
 
 from draft.learn.bodies.payload import with_payload
 from draft.learn.measuring.conditions import with_conditions
-from draft.learn.measuring.levels import (
-    FORWARD_LEAST,
-    REPLICAS,
-    SECONDS,
-    SETTLE,
-    STANDING,
-    SkillTest,
-)
+from draft.learn.measuring.levels import FORWARD_LEAST, STANDING, SkillTest
 from draft.learn.measuring.summary import Request
 from draft.learn.task.mdp.events import inertia_errors
 from draft.learn.task.world.task import Task
@@ -37,21 +30,21 @@ class Trial:
         task: robots and numbers; the skill tests determine the ground.
         tests: skill tests with their levels.
         replicas: roll-outs of each level, divided equally among the members and rounded up.
+        seconds: duration of a roll-out [s].
+        settle: time at its start that is not measured [s].
         published: whether some robots stand and some are commanded at least 0.3 m/s, as in the
             released code of the paper.
         seed: seed of everything random.
-        seconds: duration of a roll-out [s].
-        settle: time at its start that is not measured [s].
         extra: events at the start, in addition to those of training, and before them.
     """
 
     task: Task
     tests: tuple[SkillTest, ...]
-    replicas: int = REPLICAS
+    replicas: int
+    seconds: float
+    settle: float
     published: bool = False
     seed: int = 0
-    seconds: float = SECONDS
-    settle: float = SETTLE
     extra: Mapping[str, EventTermCfg] = field(default_factory=dict)
 
     @property
@@ -132,9 +125,9 @@ def trial(run: Run, tests: Sequence[SkillTest], request: Request) -> Trial:
         ),
         tests=tuple(tests),
         replicas=request.replicas,
-        published=request.protocol == "published",
-        seed=request.evaluation_seed,
         seconds=request.seconds,
         settle=request.settle,
+        published=request.protocol == "published",
+        seed=request.evaluation_seed,
         extra=extra,
     )

@@ -165,7 +165,9 @@ def _put(
 def _check_meshes(env: ManagerBasedRlEnv) -> None:
     """Check that no mesh of the robot collides: all worlds have that of the first design."""
     robot, scene = robot_of(env), env.sim.mj_model
-    for i in robot.indexing.geom_ids.tolist():
+    # By the tree: the indices that mjlab keeps are a tensor of the device.
+    own = scene.body_rootid[scene.geom_bodyid] == scene.body(robot.root_body.name).rootid
+    for i in np.flatnonzero(own):
         colliding = scene.geom_contype[i] or scene.geom_conaffinity[i]
         if colliding and scene.geom_type[i] == mujoco.mjtGeom.mjGEOM_MESH:
             name = scene.geom(i).name.rpartition("/")[2]

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.bodies.payload import model_spec
 from draft.learn.task.config import Config
 from draft.learn.task.constants import Scaled
 from draft.learn.task.groups import Actuation
@@ -208,7 +209,7 @@ def robot(members: tuple[LeggedRobot, ...], config: Config, before: int = 0) -> 
         members=members,
         actuation=config.actuation,
         first=before,
-        spec_fn=partial(_spec, first.xml),
+        spec_fn=partial(model_spec, first),
         init_state=EntityCfg.InitialStateCfg(
             pos=(0.0, 0.0, first.height),
             joint_pos=dict(zip(first.joints, first.home, strict=True)),
@@ -229,10 +230,6 @@ def robot(members: tuple[LeggedRobot, ...], config: Config, before: int = 0) -> 
             ),
         ),
     )
-
-
-def _spec(xml: str) -> mujoco.MjSpec:
-    return mujoco.MjSpec.from_string(xml)
 
 
 def _actuators(first: LeggedRobot, actuation: Actuation) -> tuple[DcMotorActuatorCfg, ...]:
