@@ -59,11 +59,25 @@ BELOW: dict[str, set[str]] = {
         *("laws", "spec", "design", "model", "metrics", "explore", "learn"),
         *("reporting", "serving"),
     },
+    "validation": {
+        *("laws", "spec", "design", "model", "description", "fitting", "imports", "twins"),
+        *("metrics", "learn"),
+    },
     "study": {"laws", "spec", "design", "model", "metrics", "explore", "learn"},
     "doctor": {"learn"},
     "cli": {
         *("laws", "spec", "design", "model", "description", "fitting", "imports", "twins"),
-        *("metrics", "variation", "explore", "reporting", "studio", "learn", "study", "serving"),
+        *(
+            "metrics",
+            "variation",
+            "explore",
+            "reporting",
+            "studio",
+            "learn",
+            "study",
+            "serving",
+            "validation",
+        ),
         "doctor",
     },
     # The face for extensions: names by their modules, like those of the package itself.
