@@ -1,0 +1,86 @@
+"""Top speed, kick and step under other physics, as a table.
+
+    python -m benchmarks.physics cheetah bear giraffe
+    python -m benchmarks.physics unitree_go2 --robots ../shared/robots/survey --policy FILE.onnx
+
+Names that are designs of Draft take them; others are keys of surveyed robots, whose descriptions
+are in the folder of `--robots`, with predicted masses.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from draft.design import Design
+from draft.design.references import find_design, open_design
+from draft.errors import DraftError
+from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.measuring.policies import open_source
+from draft.twins.compare import compare_twin
+from draft.validation.physics import SETTINGS, under_physics
+
+SHOWN = ("top_speed", "kick", "step_up", "step_down", "walking_power")
+
+
+def main(
+    names: Annotated[tuple[str, ...], tyro.conf.Positional],
+    /,
+    robots: Path = Path("../shared/robots/survey"),
+    policy: str | None = None,
+    replicas: int = 16,
+    stairs: bool = False,
+    warp: bool = False,
+    only: tuple[str, ...] = (),
+    out: Path | None = None,
+) -> None:
+    """Measure and print.
+
+    Args:
+        names: designs, or keys of surveyed robots.
+        robots: folder of the descriptions.
+        policy: run or ONNX file; the family's that ships by default.
+        replicas: roll-outs at each level.
+        stairs: whether to climb and descend stairs.
+        warp: whether to measure on MuJoCo Warp too, which takes minutes on a CPU.
+        only: labels of settings; all by default.
+        out: JSON file for the numbers.
+    """
+    source = open_source(policy, blind=True)
+    chosen = [
+        one
+        for one in SETTINGS
+        if (warp or one.engine != "warp") and (not only or one.label in only)
+    ]
+    rows = []
+    for name in names:
+        member, design = _robot(name, robots)
+        print(f"| {name} | {' | '.join(SHOWN)} |")
+        for one, found in under_physics(
+            source, member, design, chosen, replicas=replicas, stairs=stairs
+        ):
+            values = {key: found[key].value for key in SHOWN if key in found}
+            print(f"| {one.label} | {' | '.join(f'{v:.3g}' for v in values.values())} |")
+            sys.stdout.flush()
+            rows.append({"robot": name, "setting": one.label, **values})
+    if out is not None:
+        out.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+
+
+def _robot(name: str, robots: Path) -> tuple[LeggedRobot, Design]:
+    try:
+        find_design(name)
+    except DraftError:
+        file = next(robots.glob(f"{name}.*"), robots / f"{name}.urdf")
+        found = compare_twin(file, poses=2, without=(name,), key=name)
+        return legged_robot(found.design, found.model), found.design
+    design = open_design(name)
+    return legged_robot(design), design
+
+
+if __name__ == "__main__":
+    tyro.cli(main, description=__doc__)
