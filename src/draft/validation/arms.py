@@ -62,7 +62,7 @@ def by_maker(
     group = {pair.name: pair.group for pair in found.links}
     total = 0.0
     for body, index in counterparts(reduced, model, found.joints):
-        welded = np.flatnonzero(model.body_weldid == model.body_weldid[index])
+        welded = np.flatnonzero(model.body_weldid == model.body_weldid[index]).tolist()
         own = _combined(model, data, welded)
         chosen = body.name not in found.unstated
         if chosen and (groups is None or group[body.name] in groups):
@@ -77,7 +77,7 @@ def by_maker(
 Rigid = tuple[float, Array, Array]  # Mass [kg], centre [m] and inertia about it [kg m2].
 
 
-def _combined(model: mujoco.MjModel, data: mujoco.MjData, bodies: Array) -> Rigid:
+def _combined(model: mujoco.MjModel, data: mujoco.MjData, bodies: list[int]) -> Rigid:
     """Mass properties of welded bodies in the world's frame."""
     masses, centres = model.body_mass[bodies], data.xipos[bodies]
     mass = float(masses.sum())

@@ -35,7 +35,7 @@ KICKS = (1.0, 1.5, 2.0, 2.5, 3.0, 3.5)  # Per sqrt(g L).
 STEPS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)  # Per L.
 REPLICAS, SECONDS, SETTLE = 16, 9.0, 3.0
 _DRAWS, _ENDS = 400, (0.05, 0.95)
-Report = Callable[[str, int, int], None]
+Report = Callable[[str, int, int], object]
 
 
 @dataclass(frozen=True)
@@ -185,10 +185,11 @@ def _numbers(
     powers = speed.get("power") or []
     at = speed["levels"].index(walking)
     pace, power = speed["speed"][at], powers[at]
-    walks = speed["survival"][at] > 0 and pace is not None and pace > 0 and power is not None
-    row = travel_of(energy, member.mass, idle + power, pace) if walks else None
-    found["walking_speed"] = pace if walks else None
-    found["walking_power"] = idle + power if walks and power is not None else None
+    row = None
+    if pace is not None and pace > 0 and power is not None:
+        row = travel_of(energy, member.mass, idle + power, pace)
+    found["walking_speed"] = None if row is None else pace
+    found["walking_power"] = None if row is None or power is None else idle + power
     found["cost_of_transport"] = None if row is None else float(row.cost_of_transport)
     found["endurance"] = None if row is None else float(row.endurance)
     found["range"] = None if row is None else float(row.range)

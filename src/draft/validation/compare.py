@@ -18,7 +18,7 @@ from draft.validation.capabilities import Estimate, in_closed_form, measured
 from draft.validation.published import figures
 from draft.validation.verdicts import Verdict, verdicts, walking_power
 
-Report = Callable[[str, int, int], None]
+Report = Callable[[str, int, int], object]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

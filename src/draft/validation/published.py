@@ -83,4 +83,4 @@ def best(found: Sequence[Figure]) -> Figure | None:
 
 def _figure(row: dict[str, str]) -> Figure:
     bound: Bound = "least" if row["bound"] == "least" else "most" if row["bound"] else ""
-    return Figure(**{**row, "low": float(row["low"]), "high": float(row["high"]), "bound": bound})  # pyright: ignore[reportArgumentType]
+    return Figure(**{**row, "low": float(row["low"]), "high": float(row["high"]), "bound": bound})

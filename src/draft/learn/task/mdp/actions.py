@@ -34,7 +34,8 @@ class DelayedTargets(JointPositionAction):
     first target after a reset is preceded by the home pose.
     """
 
-    cfg: DelayedTargetsCfg
+    # mjlab declares the base class of all its configurations.
+    cfg: DelayedTargetsCfg  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __init__(self, cfg: DelayedTargetsCfg, env: ManagerBasedRlEnv) -> None:
         super().__init__(cfg, env)

@@ -27,13 +27,14 @@ def contact_time(env: ManagerBasedRlEnv, env_ids: torch.Tensor | None, within: R
     solref[:, feet, 0] = drawn.expand(-1, len(feet)).to(solref.dtype)
 
 
-@requires_model_fields("dof_damping")
 class MotorErrors:
     """Factors on the torques of motors, and viscous friction of joints, of each world.
 
     Parameters of the term: `motor`, range of the factor on the gains and limits of a motor;
     `friction`, range of the friction torque at the no-load speed per peak torque.
     """
+
+    model_fields = ("dof_damping",)  # mjlab gives each world its own.
 
     def __init__(self, cfg: EventTermCfg, env: ManagerBasedRlEnv) -> None:
         self._env, self._robot = env, robot_of(env)
