@@ -164,7 +164,7 @@ def test_another_search_or_process_is_kept_out_of_a_study(run: Run, command: Com
     words = "optimise robot --trials 5 --out o"
     with held(Path("o"), "draft optimise"):
         err = command(words, *ARGUMENTS, code=2).err
-    assert "another 'draft optimise' is running in 'o'" in err
+    assert "another search is running in 'o'" in err
     assert not Path("o/study.db").exists()
     run("--trials 5 --out o")
     err = command(words, *ARGUMENTS, "--subject-to", "accepted", code=2).err

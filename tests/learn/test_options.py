@@ -104,7 +104,7 @@ def added(tmp_path_factory: pytest.TempPathFactory) -> Any:
             "\n    def total(": OF_A_CALL,
         },
         # What follows `Extras`.
-        "learn/measuring/evaluation_options.py": {"\n\nclass RollOuts(": OF_AN_EVALUATION},
+        "learn/measuring/evaluation_options.py": {"\n\nclass OnDevice(": OF_AN_EVALUATION},
     }
     return ChangedPackage(folder, inserted).run("-c", PROGRAM, str(folder))
 

@@ -17,7 +17,7 @@ from draft.metrics.capabilities import CAPABILITIES, MEASURED, Capability, Deriv
 from draft.study.report.table import to_texts
 from tests.learn import synthetic
 from tests.learn.measuring.columns import stood
-from tests.study.report.pages import SPEED_ONLY, tables_of
+from tests.study.report.pages import tables_of
 
 # Metrics of a policy that are no capabilities but properties of its measurement.
 OF_MEASUREMENT = {"learned.top_speed_error", "learned.inside"}
@@ -54,7 +54,7 @@ def test_an_added_capability_without_a_value_has_the_reason_of_its_input(added: 
 
 @pytest.mark.slow
 def test_an_added_capability_is_a_column_of_the_studys_tables(added: None, tmp_path: Path) -> None:
-    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
+    folder = synthetic.study(tmp_path / "study", ("cheetah",), (0,), ("nominal",), ("velocity",))
     heads, rows = to_texts(tables_of(folder)["capability_normalised"])
     assert "leg lengths per second [1/s]" in heads
     assert all(row[heads.index("leg lengths per second [1/s]")] for row in rows)

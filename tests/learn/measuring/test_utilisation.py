@@ -14,8 +14,8 @@ from draft.learn.measuring.utilisation import (
     CELLS,
     WIDTH,
     Histograms,
-    above,
     limiting,
+    near_peak,
     percentile,
     utilisation,
 )
@@ -42,8 +42,8 @@ def test_a_saturated_joint_is_at_its_limit_not_above_it() -> None:
 
 
 def test_near_the_peak_is_above_nine_tenths() -> None:
-    assert above(counted([0.5, 0.9, 0.9001, 1.0])) == 0.5
-    assert above(counted([])) is None
+    assert near_peak(counted([0.5, 0.9, 0.9001, 1.0])) == 0.5
+    assert near_peak(counted([])) is None
 
 
 def shares(**sums: tuple[float, float, float]) -> dict[str, dict[str, float | None]]:

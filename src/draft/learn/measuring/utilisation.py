@@ -89,6 +89,12 @@ def percentile(counts: np.ndarray, share: float = PERCENTILE) -> float | None:
     return float((i + (wanted - before) / counts[i]) * WIDTH)
 
 
+def near_peak(counts: np.ndarray) -> float | None:
+    """Share of the samples of torque that are near the peak; None without samples."""
+    total = counts.sum()
+    return float(counts[round(NEAR / WIDTH) :].sum() / total) if total else None
+
+
 class Limiting(TypedDict):
     """Joint class nearest its limit.
 
@@ -181,6 +187,4 @@ def _level(test: str, curve: Curve, values: Mapping[str, float | None]) -> float
 def _shares(counts: np.ndarray) -> dict[str, float | None]:
     """Percentiles of a class, counts of shape (quantities, bins)."""
     shares = {name: percentile(counts[i]) for i, name in enumerate(QUANTITIES)}
-    torques = counts[0]
-    near = float(torques[round(NEAR / WIDTH) :].sum() / total) if (total := torques.sum()) else None
-    return shares | {"near_peak": near}
+    return shares | {"near_peak": near_peak(counts[0])}
