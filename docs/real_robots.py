@@ -159,8 +159,8 @@ def _score(found: Sequence[dict[str, Any]]) -> list[str]:
 
 def _ratios(found: Sequence[dict[str, Any]]) -> list[str]:
     lines = [
-        "Capability with predicted masses over that with the maker's, by the same policy, noise and "
-        "starts.",
+        "Capability with predicted masses over that with the maker's, by the same policy, noise",
+        "and starts.",
         "",
         "| capability | robots | median of abs(log ratio) | range of ratios |",
         "| --- | ---: | ---: | --- |",

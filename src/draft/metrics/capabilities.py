@@ -69,6 +69,9 @@ CAPABILITIES = {
         "m/s", "top speed", "Largest median speed at which 80 % stay up.", _SKILL, ranked=True,
         formula="max over six commands of median |v_x|, over the last 2 s of 6 s",
     ),
+    "top_speed_beyond": Capability(
+        "m/s", "beyond training", "Top speed at commands that training had not reached.", _SKILL
+    ),
     "sustained_speed": Capability(
         "m/s", "sustained speed", "Largest speed that the motors hold for half an hour.", _SKILL,
         formula="speed at which the worst joint's RMS torque is 1.15 of its rated one",

@@ -84,7 +84,7 @@ class Guest(Run):
 
     def reached(self, iteration: int) -> Reached:
         """Largest speed that the policy was commanded."""
-        return Reached(None, self.source.forward)
+        return Reached(None, self.source.forward_for(self.plan.members[0]))
 
 
 @dataclass(frozen=True)

@@ -133,13 +133,19 @@ def measure(
     for start in range(0, len(members), block):
         own = joined(members[start : start + block])
         worlds, histograms = rolled_out(own, first, start)
-        measured = {member.name: _one(member, worlds, histograms) for member in own}
+        measured = {
+            member.name: _one(member, worlds, histograms, source.forward_for(member))
+            for member in own
+        }
         enough = LEAD * lower.levels[-1]
         slow = tuple(one for one in own if not measured[one.name].numbers["top_speed"] > enough)
         if slow:
             more, counts = rolled_out(slow, (lower,), start + len(own) - len(slow) + len(slow) // 2)
             worlds, histograms = worlds.with_rows(more), histograms.with_groups(counts)
-            measured |= {member.name: _one(member, worlds, histograms) for member in slow}
+            measured |= {
+                member.name: _one(member, worlds, histograms, source.forward_for(member))
+                for member in slow
+            }
         found += measured.values()
         report(len(found), len(members))
     return Learned(
@@ -244,13 +250,13 @@ class _One:
     limiting: str
 
 
-def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
+def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms, trained: float) -> _One:
     """Capabilities of one body."""
     own = worlds.of(worlds.member == member.name)
     by_test = curves(own)
     add_energy(by_test, member)
     add_heat(by_test, histograms, member)
-    values = scalars(by_test, member.leg_length).values
+    values = scalars(by_test, member.leg_length, trained).values
     level, error = values["peak_command"], math.nan
     if level is not None:
         error = _error(own.of((own.test == SPEED) & ~own.fell).at(level).speed)

@@ -19,7 +19,7 @@ from draft.files import new_folder, write
 from draft.learn.measuring.energy import add_energy, supply_record
 from draft.learn.measuring.evaluation_options import Extras, Options
 from draft.learn.measuring.heating import add_heat
-from draft.learn.measuring.levels import SkillTest, flags, settle
+from draft.learn.measuring.levels import SPEED, SkillTest, flags, settle, trained
 from draft.learn.measuring.scalars import Worlds, curves, scalars
 from draft.learn.measuring.summary import ARMS, FORMAT, Request, Summary, parse
 from draft.learn.measuring.utilisation import QUANTITIES, Histograms, utilisation
@@ -112,7 +112,9 @@ def summarise(
         record: `device`, `engine` and `took_s`.
     """
     members = run.plan.members
-    notes = flags(tests, run.plan, request.iteration, run.reached(request.iteration))
+    reached = run.reached(request.iteration)
+    notes = flags(tests, run.plan, request.iteration, reached)
+    fastest = trained(SPEED, run.plan, request.iteration, reached)
     asked = request.as_dict()
     return Summary.model_validate(
         {
@@ -125,7 +127,7 @@ def summarise(
             "asked": request,
             "versions": versions(),
             **record,
-            **_measured(members, request, worlds, histograms, notes),
+            **_measured(members, request, worlds, histograms, notes, fastest),
             "flags": tuple(dict.fromkeys(notes)),
         }
     )
@@ -151,14 +153,15 @@ def _measured(
     worlds: Worlds,
     histograms: Histograms,
     notes: list[str],
+    fastest: float,
 ) -> dict[str, Any]:
     """Numbers of one design, or curves over all and each design's own; adds to the flags."""
     if len(members) == 1:
-        return _of_member(members[0], request, worlds, histograms, notes)
+        return _of_member(members[0], request, worlds, histograms, notes, fastest)
     by_member = {}
     for member in members:
         own: list[str] = []
-        by_member[member.name] = _of_member(member, request, worlds, histograms, own)
+        by_member[member.name] = _of_member(member, request, worlds, histograms, own, fastest)
         notes += [f"{member.name}: {text}" for text in own]
     names = by_member[members[0].name]["scalars"]
     return {
@@ -175,12 +178,13 @@ def _of_member(
     worlds: Worlds,
     histograms: Histograms,
     notes: list[str],
+    fastest: float,
 ) -> dict[str, Any]:
     """Numbers of one design, as `Measured` takes them; adds to the flags."""
     of_member = curves(worlds.of(worlds.member == member.name), request.regeneration)
     add_energy(of_member, member, request.payload)
     add_heat(of_member, histograms, member)
-    capabilities = scalars(of_member, member.leg_length)
+    capabilities = scalars(of_member, member.leg_length, fastest)
     notes += capabilities.flags
     return {
         "leg_length": member.leg_length,

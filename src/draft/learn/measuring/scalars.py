@@ -6,6 +6,7 @@ that roll-outs cannot give is None with a reason, never not-a-number.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Required
@@ -19,6 +20,7 @@ from draft.metrics.capabilities import CAPABILITIES
 
 SURVIVAL = 0.8  # Share that must not fall at a speed for it to count.
 HALF_HOUR = 1800.0  # Time for which a speed has to be held to count as sustained [s].
+_ROUNDED = 1e-6  # Relative error of a level.
 LONGEST = 1e5  # Longest time that is told apart from no limit [s].
 HALF = 0.5  # Share that must recover from a kick, or traverse a step.
 
@@ -186,16 +188,17 @@ def curves(rows: Worlds, regeneration: float = 0.0) -> dict[str, Curve]:
     return by_test
 
 
-def scalars(by_test: Mapping[str, Curve], leg_length: float) -> Scalars:
+def scalars(by_test: Mapping[str, Curve], leg_length: float, trained: float = math.inf) -> Scalars:
     """Compute the capabilities from the curves of skill tests.
 
     Args:
         by_test: curves by test, from `curves`.
         leg_length: leg length of the design [m].
+        trained: fastest command of the training [m/s]: top speeds are those up to it.
     """
     result = Scalars()
     if SPEED in by_test:
-        _speed(result, by_test[SPEED])
+        _speed(result, by_test[SPEED], trained)
     if WALK in by_test:
         _walk(result, by_test[WALK])
     if PUSH in by_test:
@@ -209,14 +212,19 @@ def scalars(by_test: Mapping[str, Curve], leg_length: float) -> Scalars:
     return result
 
 
-def top_speed(curve: Curve) -> tuple[float, float] | None:
-    """Largest median speed over the levels with enough survival, and its level; None if none."""
+def top_speed(curve: Curve, trained: float = math.inf) -> tuple[float, float] | None:
+    """Largest median speed over the levels with enough survival, and its level; None if none.
+
+    Args:
+        curve: curve of commanded speeds.
+        trained: fastest command that counts [m/s].
+    """
     counted = [
         (speed, level)
         for level, share, speed in zip(
             curve["levels"], curve["survival"], curve["speed"], strict=True
         )
-        if share >= SURVIVAL and speed is not None
+        if share >= SURVIVAL and speed is not None and level <= trained * (1 + _ROUNDED)
     ]
     return max(counted, key=lambda pair: pair[0], default=None)
 
@@ -246,9 +254,13 @@ def tallest(levels: Sequence[float], shares: Sequence[float]) -> float | None:
     return max((n for n, share in zip(levels, shares, strict=True) if share >= HALF), default=None)
 
 
-def _speed(result: Scalars, curve: Curve) -> None:
-    best = top_speed(curve)
+def _speed(result: Scalars, curve: Curve, trained: float) -> None:
+    best, beyond = top_speed(curve, trained), top_speed(curve)
     why = _none_up(curve) or f"fewer than {SURVIVAL:.0%} stay up at every speed"
+    if curve["levels"][0] > trained * (1 + _ROUNDED):
+        why = f"every level is beyond the training, up to {trained:.3g} m/s"
+    if beyond is not None and beyond != best:
+        result.put("top_speed_beyond", beyond[0])
     result.put("top_speed", best[0] if best else None, why)
     result.put("peak_command", best[1] if best else None, why)
     eta = curve["eta"][curve["levels"].index(best[1])] if best else None
