@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from draft.reporting.report import report
     from draft.spec import Spec, load, shipped
     from draft.twins.compare import compare_twin
+    from draft.validation.compare import real_robot
 
 __all__ = [
     "Design",
@@ -65,6 +66,7 @@ __all__ = [
     "optimise",
     "play",
     "policy",
+    "real_robot",
     "report",
     "screen",
     "shipped",
@@ -89,6 +91,7 @@ _MODULES = {
     "optimise": "draft.explore.optimise",
     "play": "draft.learn.policy.playback",
     "policy": "draft.learn.policy.policy",
+    "real_robot": "draft.validation.compare",
     "report": "draft.reporting.report",
     "screen": "draft.explore.screen",
     "shipped": "draft.spec",
