@@ -50,6 +50,7 @@ def test_nothing_else_changes_and_a_second_payload_has_a_name_of_its_own() -> No
 
 
 def test_each_body_of_a_family_carries_its_own_block() -> None:
+    pytest.importorskip("scipy")  # Bodies are drawn by it.
     drawn = open_bodies(["cheetah"], ["trunk_height=0.15:0.25"], 3, seed=1).members
     first, fields = family_fields(with_payload(drawn, 10))
     assert {"geom_pos", "body_ipos"} <= fields.keys()
