@@ -84,3 +84,10 @@ def test_show_tells_which_law_the_trunk_weighs_by(
     assert f"trunk {law}" in out
     errors = {"median": "quadrupeds err by 1.18", "calibrated:": "quadrupeds err by 1.14"}
     assert errors.get(law.split()[1], "") in out
+
+
+def test_a_time_that_ends_is_shown_in_seconds(command: Command) -> None:
+    loaded = "metrics giraffe"
+    seconds = command.json(loaded)["metrics"]["hold_time"]
+    assert f" {seconds:.4g} " in command(loaded).out
+    assert "no limit" in command("metrics humanoid").out

@@ -111,6 +111,8 @@ def test_motors_that_cannot_carry_the_robot_are_weak() -> None:
     assert "the trunk sinks to" in found["falls"].message
     assert "knee" in found["weak_servo"].message or "hip" in found["weak_servo"].message
     assert scalar(found["weak_servo"].value) > scalar(found["weak_servo"].limit) == 0.1
+    share = int(found["weak_servo"].message.split("for ")[-1].partition("%")[0])
+    assert 1 <= share <= 100
 
 
 SPOILT: dict[str, Callable[[mujoco.MjModel], None]] = {
