@@ -23,8 +23,8 @@ BUDGET = {
     "fitting": 3_710,
     "imports": 6_250,
     "laws": 1_870,
-    "learn": 16_740,
-    "metrics": 1_620,
+    "learn": 16_790,
+    "metrics": 1_630,
     "model": 3_890,
     "reporting": 1_780,
     "serving": 550,
@@ -32,7 +32,7 @@ BUDGET = {
     "studio": 2_720,
     "study": 6_470,
     "twins": 1_590,
-    "validation": 760,
+    "validation": 860,
     "variation": 350,
 }
 

@@ -71,16 +71,16 @@ def test_the_report_tells_the_energy_its_band_and_its_source() -> None:
     assert "legged_batteries.csv" in record["source"]
 
 
-def test_standing_lasts_until_the_battery_is_spent_on_heat() -> None:
-    design = with_battery("{energy: 500}").resolve()
+def test_standing_lasts_until_the_battery_is_spent_on_heat_and_electronics() -> None:
+    design = with_battery("{energy: 500}\nelectronics_power: 70").resolve()
     found = of_design(design, ["endurance_standing", "cost_of_standing"])
-    watts = float(found["cost_of_standing"]) * float(design.mass)
+    watts = float(found["cost_of_standing"]) * float(design.mass) + 70
     assert found["endurance_standing"] == pytest.approx(500 / watts)
 
 
 def test_range_is_speed_times_endurance() -> None:
-    design = with_battery("{energy: 500}").resolve()
-    found = travel(design, 250.0, 2.0)
+    design = with_battery("{energy: 500}\nelectronics_power: 50").resolve()
+    found = travel(design, 200.0, 2.0)
     assert found.endurance == 2.0
     assert found.range == 2 * 3600 * 2.0
     assert found.cost_of_transport == pytest.approx(250 / (float(design.mass) * 9.81 * 2))

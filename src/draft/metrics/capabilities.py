@@ -39,6 +39,7 @@ class Capability:
         better: direction that is better; "" for neither.
         ranked: whether designs are ordered by it.
         law: law of those that follow from another one; None for those from roll-outs.
+        optional: whether tables omit it where nothing was measured.
         formula: how a metric of a policy gets it from few roll-outs; "" for no such metric.
     """
 
@@ -50,6 +51,7 @@ class Capability:
     ranked: bool = False
     law: Derived | None = None
     formula: str = ""
+    optional: bool = False
 
     @property
     def title(self) -> str:
@@ -70,15 +72,17 @@ CAPABILITIES = {
         formula="max over six commands of median |v_x|, over the last 2 s of 6 s",
     ),
     "top_speed_beyond": Capability(
-        "m/s", "beyond training", "Top speed at commands that training had not reached.", _SKILL
+        "m/s", "beyond training", "Top speed at commands that training had not reached.", _SKILL,
+        optional=True,
     ),
     "sustained_speed": Capability(
         "m/s", "sustained speed", "Largest speed that the motors hold for half an hour.", _SKILL,
         formula="speed at which the worst joint's RMS torque is 1.15 of its rated one",
+        optional=True,
     ),
     "hold_time": Capability(
         "s", "held for", "Time that the motors hold the top speed, by their overload law.",
-        _SKILL,
+        _SKILL, optional=True,
     ),
     "step": Capability(
         "m", "step", "Tallest step that half traverse, upwards and downwards.", _SKILL, ranked=True

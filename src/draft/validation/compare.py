@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from draft.errors import DraftError
@@ -60,9 +61,14 @@ def real_robot(
     conditions: Extras | None = None,
     device: str = "auto",
     engine: str = "auto",
-    report: Report = lambda what, step, steps: None,
+    report: Report | None = None,
 ) -> RealRobot:
     """Measure what a real robot can do, by its maker's masses and by those that Draft predicts.
+
+        >>> vendor = draft.export(draft.load("quadruped").resolve(), "vendor") / "robot.urdf"
+        >>> found = draft.real_robot(vendor, replicas=1, seconds=0.6)  # doctest: +SKIP
+        >>> found.predicted["top_speed"].value  # doctest: +SKIP
+        4.1
 
     Args:
         file: the maker's description, as `draft.compare_twin` takes it.
@@ -110,7 +116,7 @@ def real_robot(
             seconds=seconds,
             seed=seed,
             conditions=conditions,
-            report=lambda what, step, steps, arm=arm: report(f"{arm}: {what}", step, steps),
+            report=partial(_told, report, arm),
         )
         if words := source.warning(member):
             notes.append(words)
@@ -125,6 +131,11 @@ def real_robot(
         verdicts=tuple(verdicts(key, members["predicted"].leg_length, arms["predicted"])),
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _told(report: Report | None, arm: str, what: str, step: int, steps: int) -> None:
+    if report is not None:
+        report(f"{arm}: {what}", step, steps)
 
 
 def _policy(policy: str | Path | None, twin: Comparison, notes: list[str]) -> Source | None:

@@ -20,7 +20,7 @@ from draft.metrics import travel
 from tests.learn.measuring.columns import worlds
 from tests.learn.small import member
 
-ROBOT = replace(member(), mass=20.0, battery=(500.0, 500.0, 500.0))
+ROBOT = replace(member(), mass=20.0, battery=(500.0, 500.0, 500.0), electronics=(50.0,))
 
 
 def rolled(*rows: dict[str, float], test: str = "speed") -> Worlds:
@@ -45,17 +45,17 @@ def test_cost_of_transport_endurance_and_range_are_those_of_the_closed_form() ->
     found = curves(rolled({}))
     add_energy(found, ROBOT)
     speed = found["speed"]
-    # 500 Wh at 200 W last 2.5 h, 13.5 km at 1.5 m/s; 200 W / (20 kg 9.81 m/s2 1.5 m/s).
-    assert speed.get("endurance") == [pytest.approx(2.5)]
-    assert speed.get("range") == [pytest.approx(13_500)]
-    assert speed.get("cost_of_transport") == [pytest.approx(200 / (20 * 9.81 * 1.5))]
+    # 500 Wh at 200 W of the motors and 50 W of electronics last 2 h, 10.8 km at 1.5 m/s.
+    assert speed.get("endurance") == [pytest.approx(2.0)]
+    assert speed.get("range") == [pytest.approx(10_800)]
+    assert speed.get("cost_of_transport") == [pytest.approx(250 / (20 * 9.81 * 1.5))]
 
 
 def test_the_payload_is_moved_too_and_costs_no_range() -> None:
     found = curves(rolled({}))
     add_energy(found, ROBOT, payload=10.0)
-    assert found["speed"].get("cost_of_transport") == [pytest.approx(200 / (30 * 9.81 * 1.5))]
-    assert found["speed"].get("range") == [pytest.approx(13_500)]
+    assert found["speed"].get("cost_of_transport") == [pytest.approx(250 / (30 * 9.81 * 1.5))]
+    assert found["speed"].get("range") == [pytest.approx(10_800)]
 
 
 @pytest.mark.parametrize("row", [{"speed": -0.1}, {"speed": 0.0}, {"fell": True}])
@@ -75,9 +75,9 @@ def test_at_top_speed_the_numbers_are_those_of_its_level() -> None:
     found = curves(rolled(*levels))
     add_energy(found, ROBOT)
     told = scalars(found, 0.48).values
-    assert (told["top_speed"], told["endurance"]) == (1.8, pytest.approx(500 / 400))
-    assert told["range"] == pytest.approx(500 / 400 * 3600 * 1.8)
-    assert told["cost_of_transport"] == pytest.approx(400 / (20 * 9.81 * 1.8))
+    assert (told["top_speed"], told["endurance"]) == (1.8, pytest.approx(500 / 450))
+    assert told["range"] == pytest.approx(500 / 450 * 3600 * 1.8)
+    assert told["cost_of_transport"] == pytest.approx(450 / (20 * 9.81 * 1.8))
 
 
 def test_the_battery_is_the_designs_own_and_its_band_is_told() -> None:

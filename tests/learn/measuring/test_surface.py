@@ -196,7 +196,7 @@ def test_the_command_writes_a_table_a_figure_and_a_record(
     assert (out / "surface.png").read_bytes().startswith(b"\x89PNG")
     assert (out / "surface.json").is_file()
     text = (out / "surface.html").read_text(encoding="utf-8")
-    assert text.count("<rect data-i=") == 4 * 6  # A cell per design in each of the four maps.
+    assert text.count("<rect data-i=") == 5 * 6  # A cell per design in each of the five maps.
     assert f"draft surface cheetah --vary {' '.join(PLANE)} --policy {run.folder}" in text
     assert "--replicas 1 --seconds 1 --seed 1234567</code>" in text
     assert "draft studio" not in text  # It takes no runs.
@@ -263,6 +263,7 @@ def test_the_cost_of_transport_is_electrical_power_per_weight_and_speed() -> Non
     one, nothing = member(), np.zeros(0)
     row = {"member": one.name, "speed": 0.9, "mechanical": 120.0, "driving": 100.0, "heat": 50.0}
     samples = Histograms(nothing, nothing, nothing, np.zeros((0, 1, 3, 2)), nothing, one.classes)
-    found = learned._one(one, worlds("speed", [row] * 4), samples)
-    assert found.numbers["cost_of_transport"] == pytest.approx(150.0 / (one.mass * 9.81 * 0.9))
+    one = replace(one, electronics=(30.0,))
+    found = learned._one(one, worlds("speed", [row] * 4), samples, trained=1.0)
+    assert found.numbers["cost_of_transport"] == pytest.approx(180.0 / (one.mass * 9.81 * 0.9))
     assert found.numbers["top_speed"] == pytest.approx(0.9)

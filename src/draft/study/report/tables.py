@@ -53,7 +53,7 @@ def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
 
 def capability(study: Study, name: str = "capability") -> Table | None:
     """Return a table of `CAPTIONS`; None if none of its scalars was measured."""
-    scalars = of_table(name)
+    scalars = _recorded(study, name)
     known = {
         (design, arm, scalar): by_seed(study, design, arm, scalar)
         for design in study.members
@@ -152,9 +152,15 @@ def _limit(limit: Limit | None) -> str:
     return f"none; nearest {limit.joint}, {limit.by} {limit.value:.2f} {seeds}"
 
 
+def _recorded(study: Study, table: str) -> list[str]:
+    """Capabilities of a table, without optional ones that no evaluation of the study has."""
+    recorded = {name for one in study.evaluations for name in one.summary.scalars}
+    return [n for n in of_table(table) if n in recorded or not CAPABILITIES[n].optional]
+
+
 def seed_variation(study: Study) -> Table | None:
     """Return the coefficient of variation of every scalar over seeds."""
-    scalars = (*of_table("capability"), *of_table("walking"))
+    scalars = (*_recorded(study, "capability"), *_recorded(study, "walking"))
     rows: list[list[Cell]] = []
     for design, title in study.titles.items():
         for arm in study.arms:

@@ -28,7 +28,7 @@ from draft.learn.training.ppo.checkpoint import misfit, read_checkpoint
 from draft.learn.training.run import Run
 
 Policy = Callable[[TensorDict], torch.Tensor]  # Observations to actions, shape (worlds, joints).
-Report = Callable[[str, int, int], None]
+Report = Callable[[str, int, int], object]
 
 
 def evaluate(
