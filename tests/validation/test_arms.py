@@ -8,6 +8,8 @@ import mujoco
 import numpy as np
 import pytest
 
+pytest.importorskip("mjlab", reason="arms are rolled out, and the text is that of its MuJoCo")
+
 from draft.learn.bodies.legged import LeggedRobot
 from draft.twins.compare import Comparison, compare_twin
 from draft.validation.arms import ALL, CENTRE, INERTIA, MASS, by_maker, predicted
