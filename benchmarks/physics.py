@@ -16,7 +16,6 @@ from typing import Annotated
 
 import tyro
 
-from draft.design import Design
 from draft.design.references import find_design, open_design
 from draft.errors import DraftError
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
@@ -58,11 +57,9 @@ def main(
     ]
     rows = []
     for name in names:
-        member, design = _robot(name, robots)
+        member = _robot(name, robots)
         print(f"| {name} | {' | '.join(SHOWN)} |")
-        for one, found in under_physics(
-            source, member, design, chosen, replicas=replicas, stairs=stairs
-        ):
+        for one, found in under_physics(source, member, chosen, replicas=replicas, stairs=stairs):
             values = {key: found[key].value for key in SHOWN if key in found}
             print(f"| {one.label} | {' | '.join(f'{v:.3g}' for v in values.values())} |")
             sys.stdout.flush()
@@ -71,15 +68,14 @@ def main(
         out.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 
 
-def _robot(name: str, robots: Path) -> tuple[LeggedRobot, Design]:
+def _robot(name: str, robots: Path) -> LeggedRobot:
     try:
         find_design(name)
     except DraftError:
         file = next(robots.glob(f"{name}.*"), robots / f"{name}.urdf")
         found = compare_twin(file, poses=2, without=(name,), key=name)
-        return legged_robot(found.design, found.model), found.design
-    design = open_design(name)
-    return legged_robot(design), design
+        return legged_robot(found.design, found.model)
+    return legged_robot(open_design(name))
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ BUDGET = {
     "studio": 2_720,
     "study": 6_470,
     "twins": 1_590,
-    "validation": 860,
+    "validation": 840,
     "variation": 350,
 }
 

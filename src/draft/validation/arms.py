@@ -14,24 +14,32 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from draft.design.battery import battery
+from draft.design.electronics import electronics
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.model.texts import Text
 from draft.twins.compare import Comparison
 from draft.twins.links import counterparts
 from draft.twins.vendor import rigid
-from draft.values import Array
+from draft.values import Array, scalar
 
 MASS, CENTRE, INERTIA = "mass", "centre", "inertia"
 ALL = (MASS, CENTRE, INERTIA)
 
 
 def predicted(found: Comparison) -> LeggedRobot:
-    """The robot as Draft predicts it.
+    """The robot as Draft predicts it; both have its battery and electronics.
 
     Raises:
         DraftError: it has fewer than two legs, a joint without a motor, or no mirror image.
     """
-    return legged_robot(found.design, found.model)
+    design = found.design
+    power = battery(design)
+    return replace(
+        legged_robot(design, found.model),
+        battery=tuple(map(scalar, (power.energy, *power.band))),
+        electronics=(scalar(electronics(design).power),),
+    )
 
 
 def by_maker(

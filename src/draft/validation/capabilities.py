@@ -14,17 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from draft.design import Design
-from draft.design.battery import battery
-from draft.design.electronics import electronics
 from draft.design.legs import GRAVITY
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.machine import NATIVE, Engine, cores
 from draft.learn.measuring.conditions import with_conditions
+from draft.learn.measuring.energy import NAMES as ENERGY
+from draft.learn.measuring.energy import add_energy, electronics_power, supply
 from draft.learn.measuring.evaluation_options import Extras
 from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SKILL_TESTS, SPEED, SkillTest
 from draft.learn.measuring.policies import Source
-from draft.learn.measuring.scalars import Worlds, curves, kick, tallest, top_speed
-from draft.metrics.energy import travel_of
+from draft.learn.measuring.scalars import Worlds, curves, scalars
 from draft.metrics.leaping import push_off_of
 from draft.validation.standing import standing
 from draft.values import scalar
@@ -71,25 +70,23 @@ def in_closed_form(member: LeggedRobot, design: Design) -> dict[str, Estimate]:
 
     Args:
         member: the robot, whose masses count.
-        design: its design, for motors, battery and electronics.
+        design: its design, for the motors.
     """
     held = standing(member, design)
-    idle = scalar(electronics(design).power)
-    power = idle + held.heat
+    power = electronics_power(member) + held.heat
     return {
         "mass": Estimate.exact(member.mass),
         "payload_peak": Estimate.exact(held.payload(held.peak), "peak torque"),
         "payload_rated": Estimate.exact(held.payload(held.rated), "rated torque"),
         "jump_height": Estimate.exact(scalar(push_off_of(design, member.mass).height)),
         "standing_power": Estimate.exact(power),
-        "endurance_standing": Estimate.exact(scalar(battery(design).energy) / power),
+        "endurance_standing": Estimate.exact(supply(member)[0] / power),
     }
 
 
 def measured(
     source: Source,
     member: LeggedRobot,
-    design: Design,
     device: str,
     engine: Engine,
     *,
@@ -97,7 +94,6 @@ def measured(
     seconds: float = SECONDS,
     seed: int = 0,
     conditions: Extras | None = None,
-    speeds: tuple[float, ...] = (),
     stairs: bool = True,
     report: Report = lambda what, step, steps: None,
 ) -> dict[str, Estimate]:
@@ -106,14 +102,12 @@ def measured(
     Args:
         source: the policy.
         member: the robot.
-        design: its design, for battery and electronics.
         device: "cpu" or "cuda:0" and the like.
         engine: physics engine.
         replicas: roll-outs at each level.
         seconds: duration of a roll-out [s]; the first third is not measured.
         seed: seed of everything random.
         conditions: physics that differs from that of the training.
-        speeds: further speeds at which the power is wanted [m/s].
         stairs: whether to climb and descend stairs.
         report: called after every step with the tests' names, steps done and total steps.
 
@@ -128,7 +122,8 @@ def measured(
     root = math.sqrt(GRAVITY * member.leg_length)
     most = source.forward_for(member)
     commands = {round(most * (i + 1) / SPEEDS, 3) for i in range(SPEEDS)}
-    commands |= {round(WALKING * root, 3), *(round(speed, 3) for speed in speeds)}
+    walking = round(WALKING * root, 3)
+    commands.add(walking)
     tests = [
         _test(SPEED, tuple(sorted(commands))),
         _test(PUSH, tuple(round(k * root, 3) for k in KICKS), walking=WALKING * root),
@@ -148,9 +143,8 @@ def measured(
     worlds, _ = evaluate(
         trial, source.actor(device), device, report, engine=engine.name, threads=threads
     )
-    walking = min(commands, key=lambda speed: abs(speed - WALKING * root))
-    values = _numbers(worlds, member, design, walking)
-    drawn = _resampled(worlds, member, design, walking, seed)
+    values = _numbers(worlds, member, walking)
+    drawn = _resampled(worlds, member, walking, seed)
     found = {}
     for name, value in values.items():
         if value is None:
@@ -169,43 +163,25 @@ def _test(name: str, levels: tuple[float, ...], walking: float | None = None) ->
     return test if walking is None else replace(test, walking=walking)
 
 
-def _numbers(
-    worlds: Worlds, member: LeggedRobot, design: Design, walking: float
-) -> dict[str, float | None]:
+def _numbers(worlds: Worlds, member: LeggedRobot, walking: float) -> dict[str, float | None]:
     """Capabilities of roll-outs by name; None where there is none."""
     by_test = curves(worlds)
+    add_energy(by_test, member)
+    values = scalars(by_test, member.leg_length).values
+    names = {"step_ascent": "step_up", "step_descent": "step_down"}
+    kept = ("top_speed", "peak_command", "kick", *names)
+    found = {names.get(name, name): values[name] for name in kept if name in values}
     speed = by_test[SPEED]
-    best = top_speed(speed)
-    found: dict[str, float | None] = {
-        "top_speed": best[0] if best else None,
-        "peak_command": best[1] if best else None,
-    }
-    energy = scalar(battery(design).energy)
-    idle = scalar(electronics(design).power)
-    powers = speed.get("power") or []
     at = speed["levels"].index(walking)
-    pace, power = speed["speed"][at], powers[at]
-    row = None
-    if pace is not None and pace > 0 and power is not None:
-        row = travel_of(energy, member.mass, idle + power, pace)
-    found["walking_speed"] = None if row is None else pace
-    found["walking_power"] = None if row is None or power is None else idle + power
-    found["cost_of_transport"] = None if row is None else float(row.cost_of_transport)
-    found["endurance"] = None if row is None else float(row.endurance)
-    found["range"] = None if row is None else float(row.range)
-    for level, own in zip(speed["levels"], powers, strict=True):
-        found[f"power_at_{level:g}"] = None if own is None else idle + own
-    pushed = by_test[PUSH]
-    found["kick"] = kick(pushed["levels"], pushed.get("recovered", []))[0]
-    for name, test in (("step_up", ASCENT), ("step_down", DESCENT)):
-        if test in by_test:
-            curve = by_test[test]
-            found[name] = tallest(curve["levels"], curve.get("traversed", []))
-    return found
+    power = (speed.get("power") or [None])[at]
+    walks = (speed.get("endurance") or [None])[at] is not None and power is not None
+    found["walking_speed"] = speed["speed"][at] if walks else None
+    found["walking_power"] = electronics_power(member) + power if walks and power else None
+    return found | {name: (speed.get(name) or [None])[at] for name in ENERGY}
 
 
 def _resampled(
-    worlds: Worlds, member: LeggedRobot, design: Design, walking: float, seed: int
+    worlds: Worlds, member: LeggedRobot, walking: float, seed: int
 ) -> Mapping[str, list[float]]:
     """Numbers of bootstrap samples of the roll-outs of each level, by name."""
     rng = np.random.default_rng(seed)
@@ -215,7 +191,7 @@ def _resampled(
     drawn: dict[str, list[float]] = {}
     for _ in range(_DRAWS):
         rows = np.concatenate([rng.choice(own, len(own)) for own in groups.values()])
-        for name, value in _numbers(worlds.of(rows), member, design, walking).items():
+        for name, value in _numbers(worlds.of(rows), member, walking).items():
             found = drawn.setdefault(name, [])
             if value is not None:
                 found.append(value)

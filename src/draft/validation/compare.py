@@ -17,7 +17,7 @@ from draft.twins.compare import Comparison, compare_twin
 from draft.validation.arms import by_maker, predicted
 from draft.validation.capabilities import Estimate, in_closed_form, measured
 from draft.validation.published import figures
-from draft.validation.verdicts import Verdict, verdicts, walking_power
+from draft.validation.verdicts import Verdict, verdicts
 
 Report = Callable[[str, int, int], object]
 
@@ -101,7 +101,6 @@ def real_robot(
     source = _policy(policy, twin, notes)
     arms: dict[str, dict[str, Estimate]] = {}
     members = {"maker": by_maker(twin), "predicted": predicted(twin)}
-    extra = walking_power(key)
     for arm, member in members.items():
         arms[arm] = in_closed_form(member, twin.design)
         if source is None:
@@ -110,7 +109,6 @@ def real_robot(
         arms[arm] |= measured(
             source,
             member,
-            twin.design,
             *where,
             replicas=replicas,
             seconds=seconds,
@@ -120,7 +118,7 @@ def real_robot(
         )
         if words := source.warning(member):
             notes.append(words)
-    if extra is None and not any(one.robot == key for one in figures()):
+    if not any(one.robot == key for one in figures()):
         notes.append(f"no published figures of '{key}' ship with Draft")
     return RealRobot(
         key=key,

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from draft.design import Design
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.measuring.evaluation import setting
 from draft.learn.measuring.evaluation_options import Extras
@@ -52,7 +51,6 @@ SETTINGS = (
 def under_physics(
     source: Source,
     member: LeggedRobot,
-    design: Design,
     settings: Sequence[Setting] = SETTINGS,
     *,
     replicas: int = 16,
@@ -64,7 +62,6 @@ def under_physics(
     Args:
         source: the policy.
         member: the robot.
-        design: its design.
         settings: settings of the physics.
         replicas: roll-outs at each level.
         stairs: whether to climb and descend stairs.
@@ -81,7 +78,6 @@ def under_physics(
             measured(
                 source,
                 member,
-                design,
                 *where,
                 replicas=replicas,
                 conditions=one.extras,

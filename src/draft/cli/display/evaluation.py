@@ -11,6 +11,7 @@ from rich.table import Table
 
 from draft.cli.display.lines import Lines
 from draft.cli.display.verdict import console
+from draft.learn.measuring.evaluation_options import Extras
 from draft.learn.measuring.summary import Measured, Summary, Supply
 from draft.learn.measuring.utilisation import NEAR, Limiting
 from draft.metrics.capabilities import CAPABILITIES
@@ -97,10 +98,11 @@ def _heading(summary: Summary, design: str | None = None) -> str:
     name = (design or summary.design).rpartition(":")[2]
     words = (summary.arm, summary.errors, summary.protocol)
     unusual = [word for word in words if word not in ("nominal", None, "twins", "walking")]
-    if summary.payload:
-        unusual.append(f"with {summary.payload:g} kg")
-    if summary.regeneration:
-        unusual.append(f"regenerating {summary.regeneration:g}")
+    said = {"payload": "with {:g} kg", "regeneration": "regenerating {:g}"}
+    for setting, value in summary.model_dump(include={*Extras.model_fields}).items():
+        if value != Extras.model_fields[setting].default:
+            words = said.get(setting, f"{setting.replace('_', ' ')} {{:g}}")
+            unusual.append(words.format(value))
     return " ".join([name, f"seed {summary.seed}", *unusual])
 
 

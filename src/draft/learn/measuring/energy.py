@@ -58,8 +58,7 @@ def add_energy(by_test: Mapping[str, Curve], member: LeggedRobot, payload: float
     """Add cost of transport, endurance [h] and range [m] to curves that have power and speed.
 
     They are those of the median power, with the electronics, and the median speed of a level; None
-    where either is
-    missing or not above zero.
+    where either is missing or not above zero.
 
     Args:
         by_test: curves of one robot.
