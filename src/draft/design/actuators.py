@@ -12,6 +12,7 @@ from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import Part
+from draft.laws.limits import copper_loss
 from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantities
 from draft.laws.torque_speed import Line, stall_torque, torque_speed
 from draft.values import (
@@ -110,6 +111,11 @@ class Actuator(Quantities):
         if not self.has_corner:
             return self.peak_torque
         return stall_torque(self.peak_torque, self.no_load_speed, self.corner_speed)
+
+    @property
+    def copper_loss(self) -> Value:
+        """Heat of the motor per torque squared [W/(N m)^2], see `draft.laws.limits`."""
+        return copper_loss(self.peak_torque, self.no_load_speed, self.corner_speed)
 
     def available(self, speed: Value) -> Value:
         """Torque available at a speed in the direction of the torque [N m]; zero or more.

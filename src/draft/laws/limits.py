@@ -13,6 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from draft.laws.law import Law
+from draft.laws.torque_speed import stall_torque
 from draft.values import Value, divide, maximum, power, sqrt, where
 
 FILE = Path(__file__).resolve().parent / "data" / "limits.json"
@@ -48,6 +49,21 @@ def limits() -> Limits:
     """Return the shipped laws."""
     record: Mapping[str, Mapping[str, object]] = json.loads(FILE.read_text(encoding="utf-8"))
     return Limits(**{name: Law.read(name, law) for name, law in record.items()})
+
+
+def copper_loss(peak_torque: Value, no_load_speed: Value, corner_speed: Value) -> Value:
+    """Heat of a motor per torque squared [W/(N m)^2]: w_no_load / tau_stall of a linear motor.
+
+    A motor without a corner takes that of the trend: every drive limits its current, and a straight
+    line would have the motor turn tau_peak w_no_load into heat at standstill.
+
+    Args:
+        peak_torque: [N m].
+        no_load_speed: [rad/s].
+        corner_speed: highest speed with full peak torque [rad/s]; 0 for a straight line.
+    """
+    corner = where(corner_speed > 0, corner_speed, limits().corner(no_load_speed))
+    return no_load_speed / stall_torque(peak_torque, no_load_speed, corner)
 
 
 def hold_time(share: Value, fold: float = 1.0) -> Value:

@@ -174,24 +174,20 @@ def foot_speed(design: Design) -> Value:
 @metric(
     unit="W/kg",
     formula="sum of tau^2 w_no_load / tau_stall / M",
-    source="arXiv 2609.38405, efficiency",
+    source="arXiv 2609.38405, efficiency; tau_stall of the motor's corner, docs/limits.md",
     better="less",
 )
 def cost_of_standing(design: Design) -> Value:
     """Copper loss of the motors of the legs in the crouch, per mass [W/kg].
 
-    A motor with a straight torque-speed line draws tau_stall w_no_load at standstill without a
-    current limit, all of it copper loss, which grows with the square of the torque. The stall
-    torque is the peak torque unless the class states a corner: an upper bound then, since real
-    drives limit the current and lose less.
+    At standstill without a current limit a motor draws tau_stall w_no_load, all of it copper loss,
+    which grows with the square of the torque. The stall torque follows from the corner that the
+    class states, or else from the trend's.
     """
     found = loads(design)
     if not found:
         return math.nan
-    losses = (
-        x.leg.copies * x.torque * x.torque * (x.actuator.no_load_speed / x.actuator.stall_torque)
-        for x in found
-    )
+    losses = (x.leg.copies * x.torque * x.torque * x.actuator.copper_loss for x in found)
     return g.total(losses) / design.mass
 
 

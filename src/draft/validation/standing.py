@@ -79,12 +79,12 @@ def standing(member: LeggedRobot, design: Design) -> Standing:
     motors = list(driven.values())
     column = {
         name: np.array([scalar(getattr(motor, name)) for motor in motors])
-        for name in ("peak_torque", "rated_torque", "no_load_speed", "stall_torque")
+        for name in ("peak_torque", "rated_torque", "copper_loss")
     }
     return Standing(
         torque=data.qfrc_bias[at] - mass * GRAVITY * lift[at],
         per_mass=-GRAVITY * lift[at],
         peak=column["peak_torque"],
         rated=column["rated_torque"],
-        loss=column["no_load_speed"] / column["stall_torque"],
+        loss=column["copper_loss"],
     )

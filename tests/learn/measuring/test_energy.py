@@ -25,7 +25,7 @@ ROBOT = replace(member(), mass=20.0, battery=(500.0, 500.0, 500.0), electronics=
 
 def rolled(*rows: dict[str, float], test: str = "speed") -> Worlds:
     """Roll-outs that drive with 120 W, brake with 20 W and give off 80 W of heat."""
-    usual = {"mechanical": 140.0, "driving": 120.0, "heat": 80.0, "speed": 1.5}
+    usual = {"mechanical": 140.0, "driving": 120.0, "copper": 80.0, "speed": 1.5}
     return worlds(test, [usual | row for row in rows])
 
 
@@ -36,7 +36,7 @@ def test_electrical_power_is_driving_power_and_heat_and_braking_counts_as_zero()
 
 
 def test_power_is_the_median_of_those_that_did_not_fall() -> None:
-    rows = [{"heat": heat} for heat in (10.0, 80.0, 200.0)] + [{"heat": 1e6, "fell": True}] * 3
+    rows = [{"copper": heat} for heat in (10.0, 80.0, 200.0)] + [{"copper": 1e6, "fell": True}] * 3
     assert electrical_power(rolled(*rows)) == pytest.approx(200.0)
     assert electrical_power(rolled({"fell": True})) is None
 
@@ -71,7 +71,7 @@ def test_a_robot_that_does_not_move_forwards_has_no_range_and_says_so(
 
 
 def test_at_top_speed_the_numbers_are_those_of_its_level() -> None:
-    levels = [{"level": 1.0, "speed": 0.9}, {"level": 2.0, "speed": 1.8, "heat": 280.0}]
+    levels = [{"level": 1.0, "speed": 0.9}, {"level": 2.0, "speed": 1.8, "copper": 280.0}]
     found = curves(rolled(*levels))
     add_energy(found, ROBOT)
     told = scalars(found, 0.48).values
@@ -147,8 +147,10 @@ def test_powers_of_a_joint_that_drives_and_brakes_by_turns() -> None:
     time = 2 * np.pi * (np.arange(4000) + 0.5) / 4000
     # Torque and speed a quarter of a period apart: as much braking as driving.
     torque, speed = (torch.tensor(f(time))[:, None] for f in (np.sin, np.cos))
-    loss = torch.full_like(torque, 0.25)
-    mechanical, heat, driving = (x.mean().item() for x in powers(3 * torque, 2 * speed, loss))
+    line, loss = torch.full_like(torque, 0.25), torch.full_like(torque, 0.1)
+    found = powers(3 * torque, 2 * speed, line, loss)
+    mechanical, heat, copper, driving = (x.mean().item() for x in found)
     assert mechanical == pytest.approx(6 / np.pi, rel=1e-5)
     assert driving == pytest.approx(mechanical / 2)
     assert heat == pytest.approx(9 / 2 * 0.25)
+    assert copper == pytest.approx(9 / 2 * 0.1)

@@ -255,6 +255,7 @@ def test_power_of_a_sinusoid_is_that_of_the_closed_form() -> None:
     work, heat = torque * speed / 2, torque**2 / 2 * 20.0 / 140.0
     assert columns["mechanical"][0] == pytest.approx(work, rel=1e-4)
     assert columns["heat"][0] == pytest.approx(heat, rel=1e-4)
+    assert columns["copper"][0] == pytest.approx(heat, rel=1e-4)  # The robot states a corner.
     assert columns["driving"][0] == pytest.approx(work, rel=1e-4)
     # |sin| is above 0.8 for 1 - 2 asin(0.8) / pi of the time: so often is the share above 0.4.
     share = counts[0, 1, 0, 80:].sum() / steps

@@ -261,7 +261,7 @@ def test_a_policy_drives_no_robot_of_other_joints() -> None:
 def test_the_cost_of_transport_is_electrical_power_per_weight_and_speed() -> None:
     # Braking costs nothing: of 120 W of work 100 W drive, and 50 W heat the motors.
     one, nothing = member(), np.zeros(0)
-    row = {"member": one.name, "speed": 0.9, "mechanical": 120.0, "driving": 100.0, "heat": 50.0}
+    row = {"member": one.name, "speed": 0.9, "mechanical": 120.0, "driving": 100.0, "copper": 50.0}
     samples = Histograms(nothing, nothing, nothing, np.zeros((0, 1, 3, 2)), nothing, one.classes)
     one = replace(one, electronics=(30.0,))
     found = learned._one(one, worlds("speed", [row] * 4), samples, trained=1.0)

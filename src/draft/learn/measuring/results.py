@@ -36,7 +36,7 @@ OCCUPANCY = "occupancy.parquet"
 PARTS = (WORLDS, UTILISATION, OCCUPANCY, SUMMARY)
 _FAMILY = "several designs: see by_member"
 # Columns without meaning for a roll-out that fell.
-_OF_WALKERS = ("speed", "mechanical", "heat", "driving", "rise")
+_OF_WALKERS = ("speed", "mechanical", "heat", "copper", "driving", "rise")
 
 
 def make_request(run: Run, tests: Sequence[SkillTest], options: Options) -> Request:

@@ -66,11 +66,12 @@ class Worlds:
         speed: mean forward speed in the trunk's frame, after settling [m/s].
         mechanical: mean of sum |tau qdot| [W].
         heat: mean of sum tau^2 w_NL / tau_stall [W].
+        copper: mean of the motors' heat, by the corner of the trend where none is stated [W].
         driving: mean of sum max(tau qdot, 0) [W].
         rise: height of the trunk at the end relative to that after settling [m].
         kept: whether it was commanded to walk.
 
-    The five measures have no meaning for a roll-out that fell.
+    The six measures have no meaning for a roll-out that fell.
     """
 
     test: np.ndarray
@@ -81,6 +82,7 @@ class Worlds:
     speed: np.ndarray
     mechanical: np.ndarray
     heat: np.ndarray
+    copper: np.ndarray
     driving: np.ndarray
     rise: np.ndarray
     kept: np.ndarray
@@ -155,7 +157,7 @@ def electrical_power(rows: Worlds, regeneration: float = 0.0) -> float | None:
         regeneration: share of the power of braking joints that returns to the battery.
     """
     braking = rows.mechanical - rows.driving
-    power = rows.driving + rows.heat - regeneration * braking
+    power = rows.driving + rows.copper - regeneration * braking
     return _median(power[~rows.fell])
 
 

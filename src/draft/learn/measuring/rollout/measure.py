@@ -14,6 +14,7 @@ import torch
 from mjlab.managers.manager_base import ManagerTermBase
 from mjlab.managers.metrics_manager import MetricsTermCfg
 
+from draft.laws.limits import copper_loss
 from draft.learn.measuring.utilisation import BINS, CELL, CELLS, QUANTITIES, WIDTH
 
 if TYPE_CHECKING:
@@ -23,20 +24,23 @@ if TYPE_CHECKING:
 
 
 def powers(
-    torque: torch.Tensor, speed: torch.Tensor, loss: torch.Tensor
-) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Mechanical power, heat and driving power of the joints [W].
+    torque: torch.Tensor, speed: torch.Tensor, line: torch.Tensor, loss: torch.Tensor
+) -> tuple[torch.Tensor, ...]:
+    """Mechanical power, heat by the line, heat and driving power of the joints [W].
 
     Args:
         torque: torques of the actuators [N m], shape (worlds, joints).
         speed: joint speeds [rad/s], same shape.
-        loss: no-load speed per stall torque [rad/s / N m], same shape.
+        line: no-load speed per stall torque [rad/s / N m], same shape.
+        loss: heat per torque squared [W/(N m)^2], same shape; see `draft.laws.limits.copper_loss`.
 
     Returns:
-        sum |tau qdot|, sum tau^2 w_NL / tau_stall and sum max(tau qdot, 0), shape (worlds,).
+        sum |tau qdot|, sum tau^2 w_NL / tau_stall, sum tau^2 loss and sum max(tau qdot, 0), shape
+        (worlds,).
     """
-    power = torque * speed
-    return power.abs().sum(1), (torque.square() * loss).sum(1), power.clamp(min=0).sum(1)
+    power, square = torque * speed, torque.square()
+    heats = ((square * line).sum(1), (square * loss).sum(1))
+    return power.abs().sum(1), *heats, power.clamp(min=0).sum(1)
 
 
 def bin_indices(shares: torch.Tensor, width: float, count: int) -> torch.Tensor:
@@ -136,9 +140,9 @@ class Measures:
         worlds = len(robot.peak_torque)
         device = robot.peak_torque.device
         self.fell = torch.zeros(worlds, dtype=torch.bool, device=device)
-        self._loss = robot.no_load_speed / robot.stall_torque
+        self._line, self._loss = robot.no_load_speed / robot.stall_torque, _copper_loss(robot)
         self._way = torch.zeros(worlds, dtype=torch.float64, device=device)
-        self._power = torch.zeros(worlds, 3, dtype=torch.float64, device=device)
+        self._power = torch.zeros(worlds, 4, dtype=torch.float64, device=device)
         self._samples, self._speed = 0, robot.data.joint_vel.clone()
         self._start = robot.data.root_link_pos_w[:, 2].clone()
         kind = torch.tensor(joint_classes, device=device)
@@ -154,7 +158,7 @@ class Measures:
             return
         self._samples += 1
         torque = self._robot.data.qfrc_actuator
-        self._power += torch.stack(powers(torque, speed, self._loss), dim=1)
+        self._power += torch.stack(powers(torque, speed, self._line, self._loss), dim=1)
         self._count(torque.abs(), speed.abs() / self._robot.no_load_speed)
 
     def add(self, fallen: torch.Tensor) -> None:
@@ -183,7 +187,8 @@ class Measures:
             "speed": (self._way / max(self._step - self._settle, 1)).cpu().numpy(),
             "mechanical": power[:, 0],
             "heat": power[:, 1],
-            "driving": power[:, 2],
+            "copper": power[:, 2],
+            "driving": power[:, 3],
             "rise": rise.cpu().numpy().astype(np.float64),
         }
 
@@ -210,3 +215,13 @@ class Measures:
         self._marginal.add(bin_indices(shares, WIDTH, BINS) + self._quantity)
         row, column = (bin_indices(share, CELL, CELLS) for share in (torque, speed))
         self._plane.add(row * CELLS + column)
+
+
+def _copper_loss(robot: Robot) -> torch.Tensor:
+    """Heat per torque squared of each joint's motor [W/(N m)^2], shape (worlds, joints)."""
+    peak, stall, fastest = (
+        numbers.cpu().numpy()
+        for numbers in (robot.peak_torque, robot.stall_torque, robot.no_load_speed)
+    )
+    loss = copper_loss(peak, fastest, fastest * (1.0 - peak / stall))
+    return torch.as_tensor(loss, dtype=torch.float32, device=robot.peak_torque.device)
