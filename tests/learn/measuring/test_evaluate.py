@@ -231,6 +231,7 @@ def recorded(worlds: int = 2) -> Any:
     limits = {
         "peak_torque": zeros + 70.0,
         "stall_torque": zeros + 140.0,
+        "copper_loss": zeros + 0.1,
         "no_load_speed": zeros + 20.0,
     }
     return SimpleNamespace(data=data, **limits)
@@ -255,7 +256,7 @@ def test_power_of_a_sinusoid_is_that_of_the_closed_form() -> None:
     work, heat = torque * speed / 2, torque**2 / 2 * 20.0 / 140.0
     assert columns["mechanical"][0] == pytest.approx(work, rel=1e-4)
     assert columns["heat"][0] == pytest.approx(heat, rel=1e-4)
-    assert columns["copper"][0] == pytest.approx(heat, rel=1e-4)  # The robot states a corner.
+    assert columns["copper"][0] == pytest.approx(torque**2 / 2 * 0.1, rel=1e-4)
     assert columns["driving"][0] == pytest.approx(work, rel=1e-4)
     # |sin| is above 0.8 for 1 - 2 asin(0.8) / pi of the time: so often is the share above 0.4.
     share = counts[0, 1, 0, 80:].sum() / steps

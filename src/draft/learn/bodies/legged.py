@@ -7,7 +7,7 @@ else that has a driven joint, such as arms and a waist, moves by the same policy
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import takewhile
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from draft.design.battery import battery
 from draft.design.legs import legs
 from draft.errors import DraftError
 from draft.laws.actuators import laws
+from draft.laws.limits import copper_loss
 from draft.laws.torque_speed import stall_torque
 from draft.learn.bodies.topology import foot_of, mirrored_joints, mirrored_legs, topology, upper_of
 from draft.metrics.speed import top_speed
@@ -106,8 +107,17 @@ class LeggedRobot:
         """Torque of each motor at standstill without its current limit [N m]."""
         if not self.corner_speed:
             return self.peak_torque
-        numbers = zip(self.peak_torque, self.no_load_speed, self.corner_speed, strict=True)
-        return tuple(scalar(stall_torque(*of)) for of in numbers)
+        return tuple(scalar(stall_torque(*of)) for of in self._motors(self.corner_speed))
+
+    @property
+    def copper_loss(self) -> tuple[float, ...]:
+        """Heat of each motor per torque squared [W/(N m)^2], see `draft.laws.limits`."""
+        speeds = self.corner_speed or (0.0,) * len(self.joints)
+        return tuple(scalar(copper_loss(*of)) for of in self._motors(speeds))
+
+    def _motors(self, corner_speed: Sequence[float]) -> Iterator[tuple[float, float, float]]:
+        """Peak torque, no-load speed and corner speed of each joint."""
+        return zip(self.peak_torque, self.no_load_speed, corner_speed, strict=True)
 
     @property
     def is_quadruped(self) -> bool:

@@ -148,6 +148,12 @@ class Rewards:
     action_rate_ramp: int = choice(
         0, "1", "iterations over which that weight grows from zero, in stage base", DRAFT
     )
+    power_weight: float = choice(
+        0.0, "1", "weight of the electrical power per weight and commanded speed", DRAFT, within=ANY
+    )
+    power_least: float = choice(
+        0.5, "m/s", "slowest command that the power is divided by", DRAFT, 0.5, within=POSITIVE
+    )
 
 
 @dataclass(frozen=True)

@@ -325,3 +325,20 @@ def test_a_reward_without_its_numbers_or_with_a_used_name_is_refused() -> None:
     term = rewards.REWARDS["height"].cfg(Rewards(height_weight=0.7, height=0.5))
     assert (term.func, term.weight) == (rewards.height, 0.7)
     assert term.params == {"target": Scaled(0.5, 1.0), "sigma": Scaled(0.11, 1.0)}
+
+
+def test_power_is_that_of_motors_and_heat_per_weight_and_command(flat: Any) -> None:
+    stand(flat)
+    flat.step(torch.linspace(-3, 3, 12).expand(flat.num_envs, 12))
+    torque, speed = flat.sim.data.qfrc_actuator[:, 6:], flat.sim.data.qvel[:, 6:]
+    assert (torque * speed < 0).any()  # Some brake, and return nothing.
+    robots = flat.scene["robot"].cfg.members
+    loss = torch.stack(
+        [torch.tensor(m.no_load_speed) / torch.tensor(m.peak_torque) for m in robots]
+    )
+    heat = torque.square() * 0.453125 * loss[flat.scene["robot"].member]
+    watts = ((torque * speed).clamp(min=0.0) + heat).sum(1)
+    weight = each(flat, [9.81 * m.mass for m in robots])
+    for asked, counted in ((2.0, torch.tensor(2.0)), (0.0, 0.5 * roots(flat))):
+        ask(flat, asked)
+        near(rewards.power(flat, Scaled(0.5, 0.5)), watts / (weight * counted))

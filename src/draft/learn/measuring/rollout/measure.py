@@ -14,7 +14,6 @@ import torch
 from mjlab.managers.manager_base import ManagerTermBase
 from mjlab.managers.metrics_manager import MetricsTermCfg
 
-from draft.laws.limits import copper_loss
 from draft.learn.measuring.utilisation import BINS, CELL, CELLS, QUANTITIES, WIDTH
 
 if TYPE_CHECKING:
@@ -140,7 +139,7 @@ class Measures:
         worlds = len(robot.peak_torque)
         device = robot.peak_torque.device
         self.fell = torch.zeros(worlds, dtype=torch.bool, device=device)
-        self._line, self._loss = robot.no_load_speed / robot.stall_torque, _copper_loss(robot)
+        self._line = robot.no_load_speed / robot.stall_torque
         self._way = torch.zeros(worlds, dtype=torch.float64, device=device)
         self._power = torch.zeros(worlds, 4, dtype=torch.float64, device=device)
         self._samples, self._speed = 0, robot.data.joint_vel.clone()
@@ -158,7 +157,9 @@ class Measures:
             return
         self._samples += 1
         torque = self._robot.data.qfrc_actuator
-        self._power += torch.stack(powers(torque, speed, self._line, self._loss), dim=1)
+        self._power += torch.stack(
+            powers(torque, speed, self._line, self._robot.copper_loss), dim=1
+        )
         self._count(torque.abs(), speed.abs() / self._robot.no_load_speed)
 
     def add(self, fallen: torch.Tensor) -> None:
@@ -215,13 +216,3 @@ class Measures:
         self._marginal.add(bin_indices(shares, WIDTH, BINS) + self._quantity)
         row, column = (bin_indices(share, CELL, CELLS) for share in (torque, speed))
         self._plane.add(row * CELLS + column)
-
-
-def _copper_loss(robot: Robot) -> torch.Tensor:
-    """Heat per torque squared of each joint's motor [W/(N m)^2], shape (worlds, joints)."""
-    peak, stall, fastest = (
-        numbers.cpu().numpy()
-        for numbers in (robot.peak_torque, robot.stall_torque, robot.no_load_speed)
-    )
-    loss = copper_loss(peak, fastest, fastest * (1.0 - peak / stall))
-    return torch.as_tensor(loss, dtype=torch.float32, device=robot.peak_torque.device)

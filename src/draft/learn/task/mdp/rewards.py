@@ -200,6 +200,20 @@ def action_rate(env: ManagerBasedRlEnv, ramp: int, steps: int) -> torch.Tensor:
     return envs_mdp.action_rate_l2(env) * factor
 
 
+@reward(least="power_least")
+def power(env: ManagerBasedRlEnv, least: Scaled) -> torch.Tensor:
+    """Electrical power per weight and commanded speed: the cost of transport at the command.
+
+    It is that of `draft.learn.measuring.energy`, without the electronics, at the end of a step. A
+    command slower than `least` counts as that.
+    """
+    robot = robot_of(env)
+    torque, moved = robot.data.qfrc_actuator, robot.data.joint_vel
+    watts = (torque * moved).clamp(min=0.0) + robot.copper_loss * torque.square()
+    size = command_of(env)[:, :2].norm(dim=1).maximum(robot.scaled(least))
+    return watts.sum(1) / (robot.weight * size)
+
+
 def speed(env: ManagerBasedRlEnv, headroom: float, gate: float) -> torch.Tensor:
     """clip(vx sign(vx*), 0, v_cap) / v_cap if |vx*| > gate v_cap; v_cap = headroom x top speed."""
     robot = robot_of(env)
@@ -245,5 +259,7 @@ def reward_cfgs(task: Task) -> dict[str, RewardTermCfg]:
     """Configurations of the reward terms that all stages share, by name."""
     config = task.config
     terms = {name: term.cfg(config.rewards) for name, term in REWARDS.items()}
+    if not config.rewards.power_weight:
+        del terms["power"]  # It is no published term.
     terms["action_rate"].params = {"ramp": 0, "steps": config.learning.steps}
     return terms

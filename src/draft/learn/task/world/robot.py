@@ -19,6 +19,7 @@ from mjlab.entity import Entity, EntityArticulationInfoCfg, EntityCfg
 from mjlab.utils.spec_config import CollisionCfg
 from numpy.typing import ArrayLike
 
+from draft.design.legs import GRAVITY
 from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.bodies.payload import model_spec
@@ -62,6 +63,8 @@ class Robot(Entity):
         no_load_speed: no-load speed of each joint [rad/s], shape (worlds, joints).
         peak_torque: peak torque of each joint [N m], shape (worlds, joints).
         stall_torque: torque at standstill without the current limit [N m], shape (worlds, joints).
+        copper_loss: heat per torque squared [W/(N m)^2], shape (worlds, joints).
+        weight: weight of the design, without what the task adds [N], shape (worlds,).
         design: features of the design, shape (worlds, features); see `draft.learn.bodies.features`.
     """
 
@@ -72,6 +75,8 @@ class Robot(Entity):
     peak_torque: torch.Tensor
     stall_torque: torch.Tensor
     no_load_speed: torch.Tensor
+    copper_loss: torch.Tensor
+    weight: torch.Tensor
     design: torch.Tensor
     home: torch.Tensor
     ranges: torch.Tensor
@@ -122,8 +127,9 @@ class Robot(Entity):
         Raises:
             KeyError, RuntimeError: they are not those of these worlds.
         """
-        # Earlier states knew straight lines only.
-        numbers = {"stall_torque": numbers["peak_torque"], **numbers}
+        # Earlier states knew straight lines only, and no term of theirs needed masses or heat.
+        usual = {name: getattr(self, name) for name in ("weight", "copper_loss")}
+        numbers = {"stall_torque": numbers["peak_torque"], **usual, **numbers}
         self.redrawn = True
         for name in NUMBERS:
             getattr(self, name).copy_(numbers[name])
@@ -169,7 +175,7 @@ class Robot(Entity):
 
 NUMBERS = (
     *("leg_scale", "height", "top_speed", "peak_torque", "stall_torque", "no_load_speed", "design"),
-    *("home", "ranges"),
+    *("home", "ranges", "weight", "copper_loss"),
 )
 
 
@@ -182,6 +188,8 @@ def _numbers(members: Sequence[LeggedRobot], device: str | torch.device) -> dict
         "peak_torque": [m.peak_torque for m in members],
         "stall_torque": [m.stall_torque for m in members],
         "no_load_speed": [m.no_load_speed for m in members],
+        "copper_loss": [m.copper_loss for m in members],
+        "weight": [GRAVITY * m.mass for m in members],
         "design": family_features(tuple(members)),
         "home": [m.home for m in members],
         "ranges": [m.ranges for m in members],
