@@ -47,7 +47,7 @@ from draft.learn.measuring.scalars import Curve, curves, scalars
 from draft.learn.silence import quiet
 from draft.learn.task.recipes import LAPTOP, TUNE, RecipeName
 from draft.learn.training.ppo.trainer import task_of
-from draft.learn.training.run import SHIPPED, Plan, Run
+from draft.learn.training.run import Plan, Run
 from draft.values import scalar
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def _row(
         _write(file, row)
     if tune and "tuned" not in row:
         name = f"tuned-{source.digest[:6]}"
-        run = train("velocity", name, iterations, origin=family or SHIPPED, recipe=TUNE.name)
+        run = train("velocity", name, iterations, origin=family or "family", recipe=TUNE.name)
         row["tuned"] = measure(*_of(run))
         _write(file, row)
     return row

@@ -19,7 +19,7 @@ import tyro
 from draft.design.references import find_design, open_design
 from draft.errors import DraftError
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
-from draft.learn.measuring.policies import open_source
+from draft.learn.measuring.policies import climbing_family, open_source
 from draft.twins.compare import compare_twin
 from draft.validation.physics import SETTINGS, under_physics
 
@@ -49,7 +49,9 @@ def main(
         only: labels of settings; all by default.
         out: JSON file for the numbers.
     """
-    source = open_source(policy, blind=True)
+    source, climber = open_source(policy, blind=True), None
+    if stairs:
+        climber = source if policy else climbing_family()
     chosen = [
         one
         for one in SETTINGS
@@ -59,7 +61,8 @@ def main(
     for name in names:
         member = _robot(name, robots)
         print(f"| {name} | {' | '.join(SHOWN)} |")
-        for one, found in under_physics(source, member, chosen, replicas=replicas, stairs=stairs):
+        measured = under_physics(source, member, chosen, replicas=replicas, climber=climber)
+        for one, found in measured:
             values = {key: found[key].value for key in SHOWN if key in found}
             print(f"| {one.label} | {' | '.join(f'{v:.3g}' for v in values.values())} |")
             sys.stdout.flush()

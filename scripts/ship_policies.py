@@ -16,7 +16,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from draft.files import write
-from draft.learn.policy.policy import FAMILY, FOLDER, SKILLS
+from draft.learn.policy.policy import FAMILIES, FOLDER, SKILLS
 from draft.learn.training.ppo.onnx import export
 from draft.learn.training.run import is_run, open_run
 from draft.learn.watching.play import Player
@@ -31,7 +31,8 @@ def main(folder: Path) -> None:
     A design of a study that is not through is left out.
     """
     if is_run(folder):
-        _ship(folder, FAMILY)
+        skill = next(k for k, stage in SKILLS.items() if stage == open_run(folder).plan.stage)
+        _ship(folder, FAMILIES[skill])
         return
     study = read(folder)
     for design in study.titles:

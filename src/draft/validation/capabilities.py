@@ -30,7 +30,7 @@ from draft.values import scalar
 
 SPEEDS = 8  # Commands up to the fastest that was trained.
 WALKING = 0.5  # Commanded speed of a walk, per sqrt(g L).
-KICKS = (1.0, 1.5, 2.0, 2.5, 3.0, 3.5)  # Per sqrt(g L).
+KICKS = (1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5)  # Per sqrt(g L).
 STEPS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)  # Per L.
 REPLICAS, SECONDS, SETTLE = 16, 9.0, 3.0
 _DRAWS, _ENDS = 400, (0.05, 0.95)
@@ -94,7 +94,7 @@ def measured(
     seconds: float = SECONDS,
     seed: int = 0,
     conditions: Extras | None = None,
-    stairs: bool = True,
+    climber: Source | None = None,
     report: Report = lambda what, step, steps: None,
 ) -> dict[str, Estimate]:
     """Capabilities of a robot from roll-outs of a policy.
@@ -108,7 +108,7 @@ def measured(
         seconds: duration of a roll-out [s]; the first third is not measured.
         seed: seed of everything random.
         conditions: physics that differs from that of the training.
-        stairs: whether to climb and descend stairs.
+        climber: policy that climbs and descends stairs; None to leave stairs out.
         report: called after every step with the tests' names, steps done and total steps.
 
     Raises:
@@ -118,31 +118,28 @@ def measured(
     from draft.learn.measuring.rollout.trial import Trial
     from draft.learn.training.ppo.trainer import task_of
 
-    source.match(member)
     root = math.sqrt(GRAVITY * member.leg_length)
     most = source.forward_for(member)
     commands = {round(most * (i + 1) / SPEEDS, 3) for i in range(SPEEDS)}
     walking = round(WALKING * root, 3)
     commands.add(walking)
-    tests = [
-        _test(SPEED, tuple(sorted(commands))),
-        _test(PUSH, tuple(round(k * root, 3) for k in KICKS), walking=WALKING * root),
-    ]
-    if stairs:
-        heights = tuple(round(share * member.leg_length, 4) for share in STEPS)
-        tests += [_test(name, heights, walking=WALKING * root) for name in (ASCENT, DESCENT)]
-    task = replace(
-        task_of(source.plan),
-        members=(member,),
-        config=with_conditions(source.plan.config, conditions or Extras()),
-    )
-    trial = Trial(
-        task, tuple(tests), replicas, seed=seed, seconds=seconds, settle=seconds * SETTLE / SECONDS
-    )
-    threads = cores() if engine.name == NATIVE else 1
-    worlds, _ = evaluate(
-        trial, source.actor(device), device, report, engine=engine.name, threads=threads
-    )
+    heights = tuple(round(share * member.leg_length, 4) for share in STEPS)
+    runs = _test(SPEED, tuple(sorted(commands)))
+    kicks = _test(PUSH, tuple(round(k * root, 3) for k in KICKS), walking=WALKING * root)
+    chosen = [(source, (runs, kicks))]
+    if climber is not None:
+        up, down = (_test(name, heights, walking=WALKING * root) for name in (ASCENT, DESCENT))
+        chosen.append((climber, (up, down)))
+    threads, settle = cores() if engine.name == NATIVE else 1, seconds * SETTLE / SECONDS
+    parts = []
+    for one, tests in chosen:
+        one.match(member)
+        config = with_conditions(one.plan.config, conditions or Extras())
+        task = replace(task_of(one.plan), members=(member,), config=config)
+        trial = Trial(task, tests, replicas, seconds, settle, seed=seed)
+        where = {"engine": engine.name, "threads": threads}
+        parts.append(evaluate(trial, one.actor(device), device, report, **where)[0])
+    worlds = parts[0].with_rows(*parts[1:])
     values = _numbers(worlds, member, walking)
     drawn = _resampled(worlds, member, walking, seed)
     found = {}

@@ -12,7 +12,7 @@ from draft.imports.options import Options
 from draft.laws.survey import read
 from draft.learn.measuring.evaluation import setting
 from draft.learn.measuring.evaluation_options import Extras
-from draft.learn.measuring.policies import Source, open_source
+from draft.learn.measuring.policies import Source, climbing_family, open_source
 from draft.twins.compare import Comparison, compare_twin
 from draft.validation.arms import by_maker, predicted
 from draft.validation.capabilities import Estimate, in_closed_form, measured
@@ -98,7 +98,7 @@ def real_robot(
         key=key if known else "",
     )
     notes: list[str] = []
-    source = _policy(policy, twin, notes)
+    source, climber = _policies(policy, twin, notes)
     arms: dict[str, dict[str, Estimate]] = {}
     members = {"maker": by_maker(twin), "predicted": predicted(twin)}
     for arm, member in members.items():
@@ -114,6 +114,7 @@ def real_robot(
             seconds=seconds,
             seed=seed,
             conditions=conditions,
+            climber=climber,
             report=partial(_told, report, arm),
         )
         if words := source.warning(member):
@@ -136,8 +137,10 @@ def _told(report: Report | None, arm: str, what: str, step: int, steps: int) -> 
         report(f"{arm}: {what}", step, steps)
 
 
-def _policy(policy: str | Path | None, twin: Comparison, notes: list[str]) -> Source | None:
-    """The policy, if it drives the robot; a note says why not."""
+def _policies(
+    policy: str | Path | None, twin: Comparison, notes: list[str]
+) -> tuple[Source | None, Source | None]:
+    """The policy, and that of stairs, if they drive the robot; a note says why not."""
     source = open_source(policy, blind=True)
     try:
         source.match(predicted(twin))
@@ -145,8 +148,8 @@ def _policy(policy: str | Path | None, twin: Comparison, notes: list[str]) -> So
         if policy is not None:
             raise
         notes.append(f"not measured by roll-outs: {error.problems[0].cause}")
-        return None
-    return source
+        return None, None
+    return source, source if policy is not None else climbing_family()
 
 
 def _surveyed(key: str) -> bool:

@@ -54,7 +54,7 @@ def under_physics(
     settings: Sequence[Setting] = SETTINGS,
     *,
     replicas: int = 16,
-    stairs: bool = False,
+    climber: Source | None = None,
     report: Callable[[str], None] = lambda label: None,
 ) -> Iterator[tuple[Setting, dict[str, Estimate]]]:
     """Yield the capabilities of a robot under each setting.
@@ -64,7 +64,7 @@ def under_physics(
         member: the robot.
         settings: settings of the physics.
         replicas: roll-outs at each level.
-        stairs: whether to climb and descend stairs.
+        climber: policy that climbs and descends stairs; None to leave stairs out.
         report: called with the label of each setting before it.
 
     Raises:
@@ -81,6 +81,6 @@ def under_physics(
                 *where,
                 replicas=replicas,
                 conditions=one.extras,
-                stairs=stairs,
+                climber=climber,
             ),
         )

@@ -13,9 +13,12 @@ import pytest
 torch = pytest.importorskip("torch")
 pytest.importorskip("mjlab")
 
+import draft  # noqa: E402
 from draft import learn  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
+from draft.learn.bodies.legged import legged_robot  # noqa: E402
 from draft.learn.measuring.policies import commanded, open_source  # noqa: E402
+from draft.learn.policy.matching import Match, match_of  # noqa: E402
 from draft.learn.policy.policy import FAMILY, Policy, open_policy  # noqa: E402
 from draft.learn.task.recipes import LAPTOP  # noqa: E402
 from draft.learn.training.options import SliceOptions, TrainOptions  # noqa: E402
@@ -24,6 +27,7 @@ from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.warm_start import ALONE  # noqa: E402
 from draft.learn.training.progress import PROGRESS, fastest  # noqa: E402
 from draft.learn.training.train import prepare  # noqa: E402
+from tests.learn.policy.test_matching import LEGS, SIGNS, made, tree  # noqa: E402
 from tests.learn.runs import QUICK, exported, trained  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
@@ -172,7 +176,7 @@ def test_nothing_is_tuned_from_nothing(origin: str | None, tmp_path: Path) -> No
     assert not (tmp_path / "run").exists()
 
 
-OTHER = replace(member(), joints=tuple(f"{name}_" for name in member().joints))
+OTHER = replace(member(), home=tuple(-angle for angle in member().home))  # Knees to the front.
 
 
 @pytest.mark.parametrize(
@@ -208,3 +212,28 @@ def test_a_file_that_changed_since_is_not_taken(file: Path, tmp_path: Path) -> N
     copy.write_bytes(FAMILY.read_bytes())
     with pytest.raises(DraftError, match="has changed since"):
         Trainer(run, "cpu", engine=QUICK)
+
+
+def test_a_robot_with_other_joints_starts_as_it_is_driven(tmp_path: Path) -> None:
+    """Its network gives what the policy gives, with the joints and signs of the robot."""
+    shipped = Path(draft.__file__).parent / "robots/quadruped"
+    model = made(tmp_path / "robot", shipped, tree(("a", "b", "c"), SIGNS, LEGS[::-1]))
+    robot, policy = legged_robot(model.design, model), open_policy(FAMILY)
+    found = match_of(policy, robot)
+    assert isinstance(found, Match)
+    of = replace(plan(stage="push", values=HIDDEN | {"learning.mirror": True}, **FLAT))
+    run = learn.begin(tmp_path / "run", replace(of, members=(robot,)), {}, "family")
+    actor = learner(Trainer(run, "cpu", engine=QUICK)).get_policy()
+    seen = np.random.default_rng(0).normal(size=(5, policy.network.size)).astype(np.float32)
+    theirs, sign, start = seen.copy(), np.array(found.sign), 0
+    for _, length in policy.terms:
+        if length == len(sign):
+            own = seen[:, start : start + length]
+            theirs[:, start : start + length] = own[:, list(found.joints)] * sign
+        start += length
+    wanted = np.zeros((5, 12))
+    wanted[:, list(found.joints)] = policy(theirs) * sign
+    with torch.inference_mode():
+        given = actor.mlp(actor.obs_normalizer(torch.from_numpy(seen))).numpy()
+    np.testing.assert_allclose(given, wanted, atol=2e-5)
+    assert not found.same

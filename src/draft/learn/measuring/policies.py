@@ -13,7 +13,7 @@ import numpy as np
 from draft.errors import DraftError
 from draft.learn.bodies.features import family_features, features
 from draft.learn.policy.matching import Match, Structure, match, structure_of, trained_structure
-from draft.learn.policy.policy import FAMILY, Policy, open_policy
+from draft.learn.policy.policy import CLIMBING_FAMILY, FAMILY, Policy, open_policy
 from draft.learn.policy.validity import FAMILY_NAME, Region, departures, sentence
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
@@ -120,6 +120,11 @@ def open_source(name: str | Path | None = None, blind: bool = False) -> Source:
     return of_run(open_run(path), blind)
 
 
+def climbing_family() -> Source:
+    """The policy that ships for climbing."""
+    return _of_file(open_policy(CLIMBING_FAMILY), FAMILY_NAME)
+
+
 def of_run(run: Run, blind: bool = False) -> Source:
     """Return the last policy of a run.
 
@@ -191,7 +196,10 @@ def _config(policy: Policy) -> Config:
         "actuation.damping": float(np.median(policy.damping / policy.peak_torque)),
     }
     usual = LAPTOP.config
-    changed = {}
+    changed: dict[str, object] = {
+        "episodes.contact_time": policy.contact_time,
+        "episodes.delay": policy.delay,
+    }
     for name, value in own.items():
         group, _, number = name.partition(".")
         if not math.isclose(value, getattr(getattr(usual, group), number), rel_tol=_ROUNDED):

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 _ALIKE = 0.8
 _STRAIGHT = 0.05  # Bend below which a knee bends neither way [rad].
 _SIDES = {1: "left", -1: "right"}
+# Terms of the observations with a number for each joint.
+OF_JOINTS = ("joint_pos", "joint_vel", "actions")
 Leg = tuple[int, int]  # Side, 1 for left and -1 for right, and place from the front.
 
 
@@ -139,6 +141,12 @@ def structure_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> St
         knee, bend = _knee(points, axes[list(joints)])
         bends[joints[knee]] = bend
     return Structure(tuple(places), tuple(map(tuple, axes.tolist())), tuple(bends))
+
+
+def match_of(policy: Policy, member: LeggedRobot) -> Match | str:
+    """Match the joints of a policy with those of a robot; a clause says why it cannot."""
+    own = structure_of(member)
+    return match(policy.joints, trained_structure(policy), member.joints, own)
 
 
 def trained_structure(policy: Policy) -> Structure | None:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from draft.errors import DraftError, suggest
 from draft.learn.policy.matching import Structure
 from draft.learn.policy.onnx_file import Network, read
+from draft.learn.task.constants import CONTACT_TIME
 from draft.learn.task.scan import scan_points
 
 # Skills, and the stages of training that teach them.
@@ -22,9 +23,9 @@ SKILLS = {"walk": "base", "run": "velocity", "climb": "terrain", "push": "push"}
 ROBOT = "quadruped"
 DESIGN = "design"  # Term of the observation that holds the features of the design.
 FOLDER = Path(__file__).parents[2] / "robots" / ROBOT / "policies"
-# One policy of all quadrupeds of a range, and what it has learnt.
-FAMILY = FOLDER / "family.onnx"
-FAMILY_SKILLS = ("walk", "run", "push")
+# Policies of all quadrupeds of a range: one that is blind, and one that sees the ground.
+FAMILY, CLIMBING_FAMILY = FOLDER / "family.onnx", FOLDER / "family_climb.onnx"
+FAMILIES = {"walk": FAMILY, "run": FAMILY, "push": FAMILY, "climb": CLIMBING_FAMILY}
 Array = NDArray[np.float64]
 
 
@@ -52,6 +53,8 @@ class Policy:
         no_load_speed: no-load speed [rad/s], shape (joints,).
         control_period: time between two actions [s].
         timestep: physics step of the training [s].
+        contact_time: least and greatest time constant of the feet's contacts in training [s].
+        delay: least and greatest delay of the joint targets in training [s].
         terms: names and lengths of the terms of an observation, in order.
         scan_points: points of the height scan in the trunk's heading frame, forwards and to the
             left [m], shape (points, 2); none if the policy does not observe the ground.
@@ -85,6 +88,8 @@ class Policy:
     no_load_speed: Array
     control_period: float
     timestep: float
+    contact_time: tuple[float, float]
+    delay: tuple[float, float]
     terms: tuple[tuple[str, int], ...]
     scan_points: Array
     scan_range: float
@@ -214,6 +219,10 @@ def _policy(file: Path, network: Network) -> Policy:
     def numbers(key: str) -> Array:
         return np.array(texts[key].split(","), float)
 
+    def ends(key: str, usual: float) -> tuple[float, float]:
+        low, high = numbers(key) if key in texts else (usual, usual)
+        return float(low), float(high)
+
     joints = tuple(texts["joint_names"].split(","))
     names = texts["observation_names"].split(",")
     lengths = [int(n) for n in texts["observation_terms_dim"].split(",")]
@@ -241,6 +250,8 @@ def _policy(file: Path, network: Network) -> Policy:
         no_load_speed=numbers("joint_no_load_speed"),
         control_period=1.0 / float(texts["control_rate"]),
         timestep=float(texts["physics_timestep"]),
+        contact_time=ends("contact_time", CONTACT_TIME),
+        delay=ends("delay", 0.0),
         terms=tuple(zip(names, lengths, strict=True)),
         scan_points=scan_points([*numbers("height_scan_size")], float(texts["height_scan_pitch"]))
         if scan

@@ -24,7 +24,7 @@ from draft.errors import DraftError, listed
 from draft.learn.bodies.features import FEATURES, UNITS, features, readable
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.policy import policy as shipped
-from draft.learn.policy.matching import Match, match, structure_of, trained_structure
+from draft.learn.policy.matching import Match, match, match_of, structure_of, trained_structure
 from draft.learn.policy.policy import Policy
 from draft.learn.task.constants import scaled
 from draft.learn.task.recipes import LAPTOP
@@ -268,8 +268,8 @@ def check_drives(policies: Sequence[Policy], model: Model) -> None:
 def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
     """Check that the training of robots can start from a policy.
 
-    A policy that observes its design starts with any quadruped of the same joints, others only
-    with the robot that they were trained with.
+    A policy that observes its design starts with any quadruped that it drives, others only with the
+    robot that they were trained with.
 
     Args:
         policy: the policy.
@@ -280,12 +280,15 @@ def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
     """
     sees_design = bool(len(policy.features))
     for member in members:
-        if member.joints != policy.joints or (sees_design and not member.is_quadruped):
-            cause = f"{policy.file} does not drive the joints of {member.name}"
-            remedy = 'start from a policy of the same joints, or with `origin="scratch"`'
-            raise DraftError(cause, remedy)
-        if sees_design:
+        cause = f"{policy.file} does not drive the joints of {member.name}"
+        remedy = 'start from a policy of the same joints, or with `origin="scratch"`'
+        if sees_design and member.is_quadruped:
+            found = match_of(policy, member)
+            if isinstance(found, str):
+                raise DraftError(f"{cause}: {found}", remedy)
             continue
+        if member.joints != policy.joints or sees_design:
+            raise DraftError(cause, remedy)
         region = Region.of(policy.design, policy.known, policy)
         seen = features(member) if region.low else ()
         gaps = _outside(policy, region, member, seen, Match.of_equals(len(policy.joints)))
@@ -384,13 +387,11 @@ def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
         policy = shipped.policy(name, skill)
         region = Region.of(robot.name, [features(robot)], policy)
         found.append((policy, replace(region, friction=max(_frictions(design).values()))))
-    if skill in shipped.FAMILY_SKILLS:
-        family = shipped.open_policy(shipped.FAMILY)
-        region = Region.of(FAMILY_NAME, family.known, family)
-        # Its bodies have the friction of the default.
-        friction = max(_frictions(spec.resolve()).values())
-        found.append((family, replace(region, friction=friction)))
-    return tuple(found)
+    family = shipped.open_policy(shipped.FAMILIES[skill])
+    region = Region.of(FAMILY_NAME, family.known, family)
+    # Its bodies have the friction of the default.
+    friction = max(_frictions(spec.resolve()).values())
+    return *found, (family, replace(region, friction=friction))
 
 
 def _adapted(policy: Policy, member: LeggedRobot, own: ArrayLike, match: Match) -> Policy:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from draft.values import Array
 
 T = TypeVar("T")
+CONTACT_TIME = 0.02  # MuJoCo's default time constant of contacts [s].
 
 
 class Scaled(NamedTuple):

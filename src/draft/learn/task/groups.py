@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from draft.learn.task.constants import (
     ANY,
+    CONTACT_TIME,
     ITERATIONS,
     POSITIVE,
     POSITIVE_RANGE,
@@ -22,7 +23,6 @@ from draft.learn.task.constants import (
 )
 from draft.model.scene import DAMPING, STIFFNESS
 
-CONTACT_TIME = 0.02  # MuJoCo's default time constant of contacts [s].
 CODE, MJLAB, DRAFT = "released code", "mjlab", "Draft"
 Range = tuple[float, float]
 Ramp = tuple[tuple[int, float], ...]

@@ -31,7 +31,7 @@ from draft.errors import DraftError, counted, listed
 from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.bodies.legged import LeggedRobot, check_family
-from draft.learn.policy.policy import FAMILY
+from draft.learn.policy.policy import CLIMBING_FAMILY, FAMILY
 from draft.learn.task.config import Config, from_dict
 from draft.learn.task.stages import STAGES
 from draft.learn.task.terms import TERMS
@@ -44,7 +44,8 @@ if TYPE_CHECKING:
     from draft.learn.training.options import TaskOptions
 
 FORMAT = 2
-SHIPPED = "family"  # Name of the policy that ships, as one to start from.
+# Names of the policies that ship, as those to start from.
+SHIPPED = {"family": FAMILY, "family_climb": CLIMBING_FAMILY}
 RUN, RESUME, STATE = "run.json", "resume.pt", "state.json"
 _PACKAGES = (
     *("mjlab", "rsl-rl-lib", "torch"),
@@ -75,7 +76,7 @@ class Origin:
     """Policy that a stage starts from.
 
     Attributes:
-        run: folder of its run, its ONNX file, or "family" for the one that ships.
+        run: folder of its run, its ONNX file, or the name of one that ships, see `SHIPPED`.
         iteration: iterations of the checkpoint.
         digest: hash of its content.
     """
@@ -97,8 +98,8 @@ class Origin:
 
 def policy_file(name: str | Path) -> Path | None:
     """ONNX file that a policy to start from is named by; None if the name is that of a run."""
-    if str(name) == SHIPPED:
-        return FAMILY
+    if str(name) in SHIPPED:
+        return SHIPPED[str(name)]
     path = Path(name)
     return path if path.suffix == ".onnx" and not is_run(path) else None
 

@@ -11,13 +11,11 @@ from numpy.typing import ArrayLike
 from tensordict import TensorDict
 
 from draft.learn.bodies.legged import LeggedRobot
-from draft.learn.policy.matching import Match
+from draft.learn.policy.matching import OF_JOINTS, Match
 from draft.learn.policy.policy import DESIGN
 from draft.learn.task.world.access import robot_of
 
 Policy = Callable[[TensorDict], torch.Tensor]
-# Terms of the observations with a number for each joint.
-_OF_JOINTS = ("joint_pos", "joint_vel", "actions")
 _GROUP = "actor"
 
 
@@ -47,7 +45,7 @@ def matched(
         index = np.tile(np.arange(size), (len(matches), 1))
         sign = np.ones((len(matches), size))
         for row, one in enumerate(matches):
-            for name in _OF_JOINTS:
+            for name in OF_JOINTS:
                 start, end = spans.get(name, (0, 0))
                 if end > start:
                     index[row, start:end] = start + np.array(one.joints)

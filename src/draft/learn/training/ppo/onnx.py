@@ -80,6 +80,8 @@ def metadata(player: Loaded, run: Run) -> dict[str, str]:
         "action_std": action_std(player.runner.alg.get_policy()).tolist(),
         "control_rate": 1.0 / env.step_dt,
         "physics_timestep": env.physics_dt,
+        "contact_time": list(plan.config.episodes.contact_time),
+        "delay": list(plan.config.episodes.delay),
         "observation_terms_dim": _dims(env),
         "command_ranges": [[-most, most] for most in largest],
         "height_scan_size": list(numbers.scan_size),

@@ -16,6 +16,7 @@ from draft.learn.engine.machine import WARP
 from draft.learn.engine.worlds.ranks import Ranks, rank_seed
 from draft.learn.engine.worlds.simulate import make
 from draft.learn.engine.worlds.turns import Bodies
+from draft.learn.policy.matching import match_of
 from draft.learn.policy.policy import open_policy
 from draft.learn.task.mdp.environment import environment
 from draft.learn.task.world.task import Task
@@ -262,7 +263,11 @@ class Trainer:
         """Start with the policy of another run, or with the random one of the first process."""
         file = origin.policy_file if origin is not None else None
         if origin is not None and file is not None:
-            load_exported(self.runner.alg, open_policy(file), origin, self._fit)
+            policy = open_policy(file)
+            of_joints = match_of(policy, self._run.plan.members[0])
+            if isinstance(of_joints, str):
+                raise DraftError(f"{file} does not drive the robot: {of_joints}", _BROKEN)
+            load_exported(self.runner.alg, policy, origin, of_joints, self._fit)
         elif origin is not None:
             source = origin.folder(self._run.folder.parent)
             load_policy(self.runner.alg, source, origin, self.env.device, self._fit)

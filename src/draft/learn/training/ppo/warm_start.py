@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from rsl_rl.algorithms import PPO
 
 from draft.errors import DraftError
+from draft.learn.policy.matching import OF_JOINTS, Match
 from draft.learn.policy.policy import Policy
 from draft.learn.training.ppo.checkpoint import first_sentence, read_checkpoint
 from draft.learn.training.run import Origin, file_digest
@@ -61,6 +63,7 @@ def load_exported(
     alg: PPO,
     policy: Policy,
     origin: Origin,
+    of_joints: Match,
     fit: Change = lambda content: content,
 ) -> None:
     """Load the actor, with its statistics of observations, from an ONNX file.
@@ -69,27 +72,53 @@ def load_exported(
         alg: rsl-rl's algorithm, into which it is loaded.
         policy: the policy.
         origin: what the run knows of it.
+        of_joints: joints of the robot for those of the policy.
         fit: changes the content of the checkpoint before it is loaded.
 
     Raises:
         DraftError: it has changed, or has other observations or layers.
     """
     mean, divisor, layers = policy.network.layers()
+    order, sign = _inputs(policy, of_joints)
+    mean, divisor = sign * mean[order], divisor[order]
     normaliser: Any = alg.get_policy().obs_normalizer  # rsl-rl declares no type of it.
     deviation = torch.tensor(divisor[None]) - normaliser.eps
     known = policy.action_std
     noise = known if len(known) else np.full(len(policy.joints), _ACTION_STD)
+    joints, turned = _inverse(of_joints)
+    first, bias = layers[0]
+    layers[0] = first[:, order] * sign, bias
+    last, offset = layers[-1]
+    layers[-1] = last[joints] * turned[:, None], offset[joints] * turned
     state = {
         "obs_normalizer._mean": torch.tensor(mean[None]),
         "obs_normalizer._var": deviation.square(),
         "obs_normalizer._std": deviation,
         "obs_normalizer.count": torch.tensor(_TRAINED_SAMPLES),
-        "distribution.std_param": torch.tensor(noise, dtype=torch.float32),
+        "distribution.std_param": torch.tensor(noise[joints], dtype=torch.float32),
     }
     for i, (weight, bias) in enumerate(layers):
         name = f"mlp.{2 * i}"  # Between the layers there is a function.
         state |= {f"{name}.weight": torch.tensor(weight), f"{name}.bias": torch.tensor(bias)}
     _load(alg, policy.file, origin, {"actor_state_dict": state}, fit)
+
+
+def _inverse(of_joints: Match) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    """Joint of the policy for each joint of the robot, and its sign."""
+    joints = np.argsort(of_joints.joints)
+    return joints, np.array(of_joints.sign, np.float32)[joints]
+
+
+def _inputs(policy: Policy, of_joints: Match) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    """Input of the policy for each input of a robot with other joints, and its sign."""
+    order, sign, start = np.arange(policy.network.size), np.ones(policy.network.size, np.float32), 0
+    joints, turned = _inverse(of_joints)
+    for name, length in policy.terms:
+        if name in OF_JOINTS:
+            order[start : start + length] = start + joints
+            sign[start : start + length] = turned
+        start += length
+    return order, sign
 
 
 def load_policy(
