@@ -111,6 +111,15 @@ def main(
             help_behavior_hint="(default: the policy that ships for its legs)",
         ),
     ] = None,
+    train: Annotated[
+        Path | None,
+        tyro.conf.arg(
+            metavar="DIR",
+            help="Train two policies of the robot's own in this folder, one with each masses, and "
+            "measure those with --capabilities; run it again to resume.",
+            help_behavior_hint="(default: no training)",
+        ),
+    ] = None,
     json: JsonOutput = False,
 ) -> int:
     """Compare the masses and dynamics of a real robot with those that Draft predicts."""
@@ -137,8 +146,10 @@ def main(
     )
     if capabilities:
         _refuse("--capabilities", spec=spec, out=out, without=without)
-        return _capabilities(file, policy, population, options, seed, json)
-    _refuse("a comparison without --capabilities", policy=policy)
+        if policy is not None:
+            _refuse("--policy", train=train)
+        return _capabilities(file, policy, train, population, options, seed, json)
+    _refuse("a comparison without --capabilities", policy=policy, train=train)
     with if_interrupted(NOTHING):
         found = compare_twin(
             file, spec, population=population, options=options, poses=poses, seed=seed
@@ -149,6 +160,7 @@ def main(
 def _capabilities(
     file: Path,
     policy: str | None,
+    train: Path | None,
     population: str | None,
     options: Options,
     seed: int,
@@ -162,6 +174,7 @@ def _capabilities(
         found = real_robot(
             file,
             policy=policy,
+            train=train,
             population=population,
             options=options,
             seed=seed,

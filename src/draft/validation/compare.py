@@ -13,9 +13,11 @@ from draft.laws.survey import read
 from draft.learn.measuring.evaluation import setting
 from draft.learn.measuring.evaluation_options import Extras
 from draft.learn.measuring.policies import Source, climbing_family, open_source
+from draft.learn.training.progress import Progress
 from draft.twins.compare import Comparison, compare_twin
 from draft.validation.arms import by_maker, predicted
 from draft.validation.capabilities import Estimate, in_closed_form, measured
+from draft.validation.own import own_policy
 from draft.validation.published import figures
 from draft.validation.verdicts import Verdict, verdicts
 
@@ -52,6 +54,8 @@ def real_robot(
     file: str | Path,
     *,
     policy: str | Path | None = None,
+    train: str | Path | None = None,
+    iterations: int | None = None,
     key: str = "",
     options: Options | None = None,
     population: str | None = None,
@@ -73,6 +77,9 @@ def real_robot(
     Args:
         file: the maker's description, as `draft.compare_twin` takes it.
         policy: folder of a run or ONNX file; None for the policy that ships for its legs.
+        train: folder for the runs of two policies of its own, one with each masses and both of the
+            same seed, which are measured instead; runs that it holds are resumed.
+        iterations: iterations of each training; None for the recipe's.
         key: key of the robot in the survey, which is held out of the trends; "" for the name of the
             file.
         options: decisions that overrule the import's.
@@ -97,19 +104,24 @@ def real_robot(
         without=(key,) if known else (),
         key=key if known else "",
     )
-    notes: list[str] = []
+    notes = _guesses(twin)
     source, climber = _policies(policy, twin, notes)
     arms: dict[str, dict[str, Estimate]] = {}
     members = {"maker": by_maker(twin), "predicted": predicted(twin)}
     for arm, member in members.items():
         arms[arm] = in_closed_form(member, twin.design)
-        if source is None:
+        own = source
+        if train is not None:
+            told = partial(_learnt, report, arm)
+            folder = Path(train) / f"{key}-{arm}"
+            chosen = {"family": source is not None, "seed": seed, "iterations": iterations}
+            own = own_policy(member, folder, **chosen, report=told)
+        if own is None:
             continue
-        where = setting(device, engine)
         arms[arm] |= measured(
-            source,
+            own,
             member,
-            *where,
+            *setting(device, engine),
             replicas=replicas,
             seconds=seconds,
             seed=seed,
@@ -117,14 +129,14 @@ def real_robot(
             climber=climber,
             report=partial(_told, report, arm),
         )
-        if words := source.warning(member):
+        if train is None and (words := own.warning(member)):
             notes.append(words)
     if not any(one.robot == key for one in figures()):
         notes.append(f"no published figures of '{key}' ship with Draft")
     return RealRobot(
         key=key,
         twin=twin,
-        policy="" if source is None else source.name,
+        policy=str(train or ("" if source is None else source.name)),
         maker=arms["maker"],
         predicted=arms["predicted"],
         verdicts=tuple(verdicts(key, members["predicted"].leg_length, arms["predicted"])),
@@ -135,6 +147,21 @@ def real_robot(
 def _told(report: Report | None, arm: str, what: str, step: int, steps: int) -> None:
     if report is not None:
         report(f"{arm}: {what}", step, steps)
+
+
+def _guesses(twin: Comparison) -> list[str]:
+    """A note on torques that are not the maker's, on which every capability depends."""
+    drives = twin.files.drives.values()
+    guessed = [one.joint for one in drives if one.guessed]
+    if not guessed:
+        return []
+    cause = f"{len(guessed)} of {len(drives)} torques are guesses, as {guessed[0]}'s"
+    return [f"{cause}: its capabilities are those of usual motors; state them with `torque`"]
+
+
+def _learnt(report: Report | None, arm: str, stage: str, now: Progress) -> None:
+    if report is not None:
+        report(f"{arm}: training, {stage}", now.iteration, now.total)
 
 
 def _policies(

@@ -10,10 +10,10 @@ from rich.table import Table
 
 from draft.cli.display.verdict import console
 from draft.cli.spelling import spelt
+from draft.validation.capabilities import Estimate
 from draft.values import brief
 
 if TYPE_CHECKING:
-    from draft.validation.capabilities import Estimate
     from draft.validation.compare import RealRobot
     from draft.validation.verdicts import Verdict
 
@@ -48,10 +48,11 @@ def print_capabilities(found: RealRobot) -> None:
         table.add_column(heading, justify="right")
     table.add_column("verdict")
     judged = {verdict.quantity: verdict for verdict in found.verdicts}
+    nothing = Estimate.none("not measured")
     for name, (label, unit) in SHOWN.items():
-        if name not in found.predicted:
+        if name not in found.predicted and name not in judged:
             continue
-        theirs, ours = found.maker[name], found.predicted[name]
+        theirs, ours = (arm.get(name, nothing) for arm in (found.maker, found.predicted))
         ratio = ours.value / theirs.value if theirs.value else math.nan
         verdict = judged.get(name)
         table.add_row(
