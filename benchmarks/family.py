@@ -255,7 +255,8 @@ def rolled_out(
     """
     tests = (replace(SKILL_TESTS[SPEED], levels=speeds), replace(SKILL_TESTS[PUSH], levels=kicks))
     task = replace(task_of(plan), members=robots)
-    trial = Trial(task, tests, replicas * len(robots), seconds=seconds, settle=settle(seconds))
+    start = settle(seconds, tests)
+    trial = Trial(task, tests, replicas * len(robots), seconds=seconds, settle=start)
     worlds, _ = evaluate(trial, policy, "cpu", engine=NATIVE, threads=threads)
     return curves(worlds)
 

@@ -250,9 +250,9 @@ def _tests(run: Run) -> list[dict[str, Any]]:
     rows, total = [], 0.0
     climber = open_run(run.folder.with_name(run.folder.name.replace("velocity", "terrain")))
     for words, who in ((("walk", "speed", "push"), run), (("stairs",), climber)):
-        usual = RollOuts()
-        numbers = usual.replicas, usual.seconds, settle(usual.seconds)
-        trial = Trial(task_of(who.plan), named(words), *numbers)
+        usual, tests = RollOuts(), named(words)
+        numbers = usual.replicas, usual.seconds, settle(usual.seconds, tests)
+        trial = Trial(task_of(who.plan), tests, *numbers)
         policy = trained(who, who.checkpoint()[0], "cpu")
         taken, _ = timed(lambda: evaluate(trial, policy, "cpu", engine=NATIVE, threads=cores()))  # noqa: B023
         total += taken

@@ -10,6 +10,7 @@ from draft.errors import DraftError
 from draft.learn.measuring.conditions import with_conditions
 from draft.learn.measuring.evaluation_options import Extras
 from draft.learn.task.config import Config
+from tests.learn.small import member
 
 
 def numbers(**asked: Any) -> dict[str, Any]:
@@ -66,3 +67,30 @@ def test_physics_that_cannot_be_simulated_is_refused(asked: dict[str, Any], mess
     with pytest.raises(DraftError) as error:
         with_conditions(Config(), Extras(**asked))
     assert str(error.value) == message
+
+
+def test_the_noise_of_observations_is_scaled() -> None:
+    usual, half, none = (
+        with_conditions(Config(), Extras(noise=share)).observations for share in (1.0, 0.5, 0.0)
+    )
+    assert usual == Config().observations
+    names = [name for name in vars(usual) if name.endswith("_noise")]
+    assert len(names) == 6
+    for name in names:
+        assert getattr(half, name) == getattr(usual, name) / 2
+        assert getattr(none, name) == 0
+    assert half.scan_range == usual.scan_range
+
+
+def test_every_part_that_the_robots_own_model_lets_collide_may_do_so() -> None:
+    pytest.importorskip("mjlab")
+    from draft.learn.task.world.robot import robot
+
+    def colliding(**asked: Any) -> set[str]:
+        config = with_conditions(Config(), Extras(**asked))
+        (found,) = robot((member(),), config).collisions
+        return set(found.geom_names_expr)
+
+    feet, every = colliding(), colliding(all_collide=True)
+    assert feet < every
+    assert any("lower_leg" in name for name in every - feet), every - feet

@@ -12,6 +12,7 @@ from draft.learn.measuring.levels import (
     Reached,
     flags,
     of_stage,
+    settle,
     skill_tests,
     spread,
     trained,
@@ -114,3 +115,7 @@ def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
     assert told == "speed: trained up to 15 m/s; beyond it: 17 to 20"
     told = flags(skill_tests(["walk"]), plan(stage="velocity"), 1800)
     assert told == ["walk: for policies of stage base; this one is of stage velocity"]
+
+
+def test_speeds_are_measured_once_robots_are_up_to_speed() -> None:
+    assert [settle(12.0, skill_tests([word])) for word in ("speed", "push")] == [4.0, 2.0]

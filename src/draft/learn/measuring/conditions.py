@@ -39,7 +39,10 @@ def with_conditions(config: Config, asked: Extras) -> Config:
         "physics.timestep": step,
         "physics.decimation": steps,
         "episodes.delay": delay,
+        "physics.all_collide": physics.all_collide or asked.all_collide,
     }
+    noises = {name: x for name, x in vars(config.observations).items() if name.endswith("_noise")}
+    changes |= {f"observations.{name}": asked.noise * value for name, value in noises.items()}
     for name in ("friction", "contact_time"):
         value = getattr(asked, name)
         if value is not None:

@@ -52,6 +52,10 @@ class Extras(BaseModel):
         float | None, Field(ge=0, le=0.1), Shown("S", "that of the training", unit="s")
     ] = None
     """Delay of the joint targets [s], at most a control period."""
+    noise: Annotated[float, Field(ge=0, le=10), Shown("N", "1")] = 1.0
+    """Noise of the observations, per that of the training; 0 for none."""
+    all_collide: bool = False
+    """Let every part of the robot collide with the ground, not only feet and thighs."""
 
 
 class OnDevice(Settings):
@@ -68,7 +72,8 @@ class RollOuts(Settings):
     replicas: Annotated[int, Field(ge=1, le=10**6), Shown("N")] = 256
     """Roll-outs of each level, shared among a family."""
     seconds: Annotated[float, Field(ge=0.5, le=3600), Shown("S", unit="s")] = 12.0
-    """Length of a roll-out [s]; the first sixth is not counted, and kicks come every quarter."""
+    """Length of a roll-out [s]; its first sixth is not counted, of speeds the first third, and
+    kicks come every quarter."""
     seed: Annotated[int, Field(ge=0, le=2**31 - 1), Shown("N")] = 0
     """Seed of everything random."""
 

@@ -119,9 +119,12 @@ def no_levels(given: str, most: float | None = None) -> DraftError:
     return DraftError(cause, "such as 5, or 0.4,1.0,2.0")
 
 
-def settle(seconds: float) -> float:
-    """Time at the start of a roll-out that is not measured [s]."""
-    return seconds / PARTS
+def settle(seconds: float, tests: Sequence[SkillTest]) -> float:
+    """Time at the start of a roll-out that is not measured [s].
+
+    Fast robots take four seconds to get up to speed.
+    """
+    return seconds / (PARTS / 2 if any(test.name == SPEED for test in tests) else PARTS)
 
 
 def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:

@@ -60,7 +60,7 @@ def make_request(run: Run, tests: Sequence[SkillTest], options: Options) -> Requ
         protocol=options.protocol,
         replicas=options.replicas,
         seconds=options.seconds,
-        settle=settle(options.seconds),
+        settle=settle(options.seconds, () if options.protocol == "published" else tests),
         evaluation_seed=options.seed,
         levels={test.name: list(test.levels) for test in tests},
         **options.model_dump(include={*Extras.model_fields}),

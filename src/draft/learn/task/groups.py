@@ -40,6 +40,9 @@ class Physics:
     upper_legs_collide: bool = choice(
         True, "1", "thighs collide with the ground, so that their penalty can act", DRAFT
     )
+    all_collide: bool = choice(
+        False, "1", "all geoms collide with the ground that do in the robot's own model", DRAFT
+    )
 
 
 @dataclass(frozen=True)

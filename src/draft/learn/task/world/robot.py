@@ -212,6 +212,10 @@ def robot(members: tuple[LeggedRobot, ...], config: Config, before: int = 0) -> 
     colliding = list(first.foot_geoms)
     if config.physics.upper_legs_collide:
         colliding += [geom for leg in first.upper_legs for geom in leg]
+    if config.physics.all_collide:
+        model = mujoco.MjModel.from_xml_string(first.xml)
+        touches = np.flatnonzero(model.geom_contype | model.geom_conaffinity)
+        colliding = list(dict.fromkeys([*colliding, *(model.geom(int(i)).name for i in touches)]))
     feet = dict.fromkeys(first.foot_geoms, 1)
     return RobotCfg(
         members=members,
