@@ -10,6 +10,7 @@ are in the folder of `--robots`, with predicted masses.
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -66,7 +67,8 @@ def main(
             values = {key: found[key].value for key in SHOWN if key in found}
             print(f"| {one.label} | {' | '.join(f'{v:.3g}' for v in values.values())} |")
             sys.stdout.flush()
-            rows.append({"robot": name, "setting": one.label, **values})
+            known = {key: round(x, 4) for key, x in values.items() if not math.isnan(x)}
+            rows.append({"robot": name, "setting": one.label, **known})
     if out is not None:
         out.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 

@@ -4,7 +4,8 @@
     python -m docs.real_robots --measure ../shared/robots/survey unitree_go2 unitree_a1
 
 With `--measure` it measures robots first, of which a folder has the descriptions, and writes what
-`draft twin FILE --capabilities --json` prints to examples/results/real_robots.
+`draft twin FILE --capabilities --json` prints to examples/results/real_robots, and which errors of
+the masses cause what. The bands that Draft states of learnt capabilities follow from them.
 """
 
 from __future__ import annotations
@@ -19,15 +20,24 @@ from typing import Annotated, Any
 
 import tyro
 
+from docs import pictures
 from draft.cli.display.capabilities import SHOWN, record
-from draft.learn.measuring.evaluation_options import Extras
-from draft.validation.compare import real_robot
+from draft.files import write
+from draft.learn.measuring.bands import FILE as BANDS
+from draft.learn.measuring.evaluation import setting
+from draft.learn.measuring.policies import open_source
+from draft.plotting import make_folder
+from draft.validation.causes import JUDGED as CAUSED
+from draft.validation.causes import causes
+from draft.validation.compare import RealRobot, real_robot
+from draft.validation.physics import USUAL
 from draft.values import brief
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, RESULTS = ROOT / "docs/real-robots.md", ROOT / "examples/results/real_robots"
-# Physics of the page: what holds on hard ground, with the delay of a real controller.
-HONEST = Extras(contact_time=0.01, delay=0.01)
+IMAGES = ROOT / "docs/images/real_robots"
+PHYSICS = ROOT / "examples/results/physics.json"  # Of `python -m benchmarks.physics --out`.
+UNDER = ("top_speed", "kick", "step_up", "walking_power")
 JUDGED = {
     "top_speed": "top speed [m/s]",
     "step_up": "step [m]",
@@ -41,8 +51,9 @@ trends. One policy drives all of them; it was trained on bodies of Draft alone a
 them. `draft twin FILE --capabilities` measures one robot; [limits](limits.md) tells what the
 numbers leave out.
 
-Physics: contacts with a time constant of 10 ms, targets that arrive 10 ms late, 16 roll-outs of 9 s
-at each command, kick and step, and no command that is faster than those of the training."""
+Physics: contacts with a time constant of 10 ms, targets that arrive up to 15 ms late, 16 roll-outs
+of 9 s at each command, kick and step, and no command that is faster than those of the training.
+Intervals are those of the roll-outs alone, from 5 to 95 %."""
 RULE = """\
 The rule, stated before the comparison: top speed, step and standing load are limits of a machine.
 Products keep below them, so a prediction below the best published figure of that machine is an
@@ -50,8 +61,8 @@ error, and one above it is not. The power of a walk is right within a factor of 
 without a definition is not judged. A, B and C: measured in a paper or certified, stated by the
 maker, secondary text. A top speed below sqrt(g L), where walking ends, is a claim on a product, and
 in brackets."""
-COMPARED = ("top_speed", "kick", "step_up", "walking_power")
-ENERGIES = ("walking_power",)
+COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
+LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.
 
 
 def main(
@@ -63,14 +74,95 @@ def main(
     """Measure robots if asked, and write the page."""
     if measure is not None:
         RESULTS.mkdir(parents=True, exist_ok=True)
+        models = []
         for key in keys:
             file = next(iter(sorted(measure.glob(f"{key}.*"))))
             print(key, file=sys.stderr)
-            found = real_robot(file, key=key, policy=policy, conditions=HONEST)
-            text = json.dumps(record(found), indent=1) + "\n"
-            (RESULTS / f"{key}.json").write_text(text, encoding="utf-8")
-    PAGE.write_text(page(records()), encoding="utf-8")
+            found = real_robot(file, key=key, policy=policy)
+            text = json.dumps(record(found) | {"causes": _caused(found, policy)}, indent=1)
+            write(RESULTS / f"{key}.json", text + "\n")
+            models.append(found.twin.model)
+        pictures.row(models, IMAGES / "robots.png", (2000, 560))
+    rows = records()
+    write(BANDS, json.dumps(bands_of(rows), indent=1) + "\n")
+    speeds(rows)
+    write(PAGE, page(rows))
     print(PAGE)
+
+
+def _caused(found: RealRobot, policy: str | None) -> dict[str, dict[str, float]]:
+    """Causes of the differences between both columns, if a policy drives the robot."""
+    if not found.policy:
+        return {}
+    return causes(found.twin, open_source(policy, blind=True), *setting("auto", "auto"))
+
+
+def bands_of(found: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Folds of capabilities by predicted masses that hold for nine robots of ten.
+
+    They are the ratios of rank ceil(0.9 (n + 1)) of n robots, which hold for 90 % of others like
+    these, whatever the distribution (split conformal prediction; Vovk et al. 2005).
+    """
+    rows = {}
+    for name in COMPARED:
+        folds = sorted(abs(math.log(ratio)) for ratio in ratios(found, name))
+        if len(folds) >= LEAST:
+            rank = min(math.ceil(SHARE * (len(folds) + 1)), len(folds))
+            fold = round(math.exp(folds[rank - 1]), 4)
+            rows[name] = {"robots": len(folds), "fold_90": fold}
+    return rows
+
+
+def ratios(found: Sequence[dict[str, Any]], name: str) -> list[float]:
+    """Predicted over maker's masses: ratios of a capability of the robots that have both."""
+    pairs = [(one["predicted"].get(name), one["maker"].get(name)) for one in found]
+    return [
+        ours["value"] / theirs["value"]
+        for ours, theirs in pairs
+        if ours and theirs and ours["value"] and theirs["value"]
+    ]
+
+
+def speeds(found: Sequence[dict[str, Any]]) -> None:
+    """Draw predicted over published top speeds."""
+    from matplotlib.figure import Figure
+
+    points = [
+        (one, item)
+        for one in found
+        for item in one["published"]
+        if item["quantity"] == "top_speed" and one["predicted"].get("top_speed", {}).get("value")
+    ]
+    if not points:
+        return
+    figure = Figure(figsize=(6.4, 5.2), layout="constrained")
+    axes = figure.add_subplot()
+    ends = [0.8, 8.0]
+    axes.fill_between(ends, ends, [20, 20], color="#e8f0e8", lw=0, label="not below: right")
+    axes.plot(ends, ends, color="#888888", lw=1)
+    for one, item in points:
+        own, theirs = one["predicted"]["top_speed"], item["value"]
+        low, high = own["value"] - own["low"], own["high"] - own["value"]
+        color = "#1f5fa8" if item["physical"] else "#b0b0b0"
+        axes.errorbar(theirs, own["value"], [[low], [high]], fmt="o", color=color, ms=5, lw=1)
+        axes.annotate(
+            one["robot"].removeprefix("unitree_").removeprefix("deeprobotics_"),
+            (theirs, own["value"]),
+            (5, 3),
+            textcoords="offset points",
+            fontsize=8,
+            color=color,
+        )
+    axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
+    ticks = [1, 2, 3, 4, 5, 6, 8]
+    axes.set_xticks(ticks, map(str, ticks))
+    axes.set_yticks(ticks, map(str, ticks))
+    axes.minorticks_off()
+    axes.set_xlabel("published top speed [m/s]")
+    axes.set_ylabel("predicted top speed [m/s]")
+    axes.legend(loc="lower right", frameon=False)
+    make_folder(IMAGES)
+    figure.savefig(IMAGES / "speeds.png", dpi=120)
 
 
 def records() -> list[dict[str, Any]]:
@@ -96,10 +188,17 @@ def page(found: Sequence[dict[str, Any]]) -> str:
             "",
             *_score(found),
             "",
+            "![Predicted over published top speed](images/real_robots/speeds.png)",
+            "",
+            "Blue: claims on the machine. Grey: below sqrt(g L), claims on a product.",
+            "",
             "## The maker's masses and predicted ones",
             "",
             *_ratios(found),
             "",
+            *_causes(found),
+            "",
+            *_physics(),
             "## All columns",
             "",
             *(line for one in found for line in (*_columns(one), "")),
@@ -166,19 +265,65 @@ def _ratios(found: Sequence[dict[str, Any]]) -> list[str]:
         "| --- | ---: | ---: | --- |",
     ]
     for name in COMPARED:
-        pairs = [(one["predicted"].get(name), one["maker"].get(name)) for one in found]
-        ratios = [
-            ours["value"] / theirs["value"]
-            for ours, theirs in pairs
-            if ours and theirs and ours["value"] and theirs["value"]
-        ]
-        if not ratios:
+        of = ratios(found, name)
+        if not of:
             continue
-        spread = statistics.median(abs(math.log(ratio)) for ratio in ratios)
+        spread = statistics.median(abs(math.log(ratio)) for ratio in of)
         label = SHOWN[name][0]
-        ends = f"{min(ratios):.2f} to {max(ratios):.2f}"
-        lines.append(f"| {label} | {len(ratios)} | {100 * spread:.0f} % | {ends} |")
+        ends = f"{min(of):.2f} to {max(of):.2f}"
+        lines.append(f"| {label} | {len(of)} | {100 * spread:.0f} % | {ends} |")
     return lines
+
+
+def _causes(found: Sequence[dict[str, Any]]) -> list[str]:
+    """Table of the change that each error of the masses makes."""
+    rows = [one["causes"] for one in found if one.get("causes")]
+    labels = list(dict.fromkeys(label for row in rows for of in row.values() for label in of))
+    lines = [
+        "Which error it is: the same with one of the maker's numbers in place of a predicted one,",
+        "as the median over the robots of abs(log ratio), and the largest of any robot.",
+        "",
+        "| the maker's | " + " | ".join(SHOWN[name][0] for name in CAUSED) + " |",
+        "| --- |" + " ---: |" * len(CAUSED),
+    ]
+    for label in labels:
+        cells = []
+        for name in CAUSED:
+            of = [abs(math.log(row[name][label])) for row in rows if label in row[name]]
+            cells.append(f"{100 * statistics.median(of):.1f} % ({100 * max(of):.0f} %)")
+        lines.append(f"| {label} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def _physics() -> list[str]:
+    """Section with the capabilities under other physics, over those as trained."""
+    if not PHYSICS.is_file():
+        return []
+    rows = json.loads(PHYSICS.read_text(encoding="utf-8"))
+    by_robot = {(row["robot"], row["setting"]): row for row in rows}
+    robots = list(dict.fromkeys(row["robot"] for row in rows))
+    lines = [
+        "## Other physics",
+        "",
+        f"The same policy with {', '.join(robots)} (`python -m benchmarks.physics`): capabilities",
+        "over those with the physics of the training, as the median over the robots and the least",
+        "and the greatest. What falls by a sixth or more holds on that ground alone.",
+        "",
+        "| physics | " + " | ".join(SHOWN[name][0] for name in UNDER) + " |",
+        "| --- |" + " --- |" * len(UNDER),
+    ]
+    for setting_ in dict.fromkeys(row["setting"] for row in rows):
+        cells = []
+        for name in UNDER:
+            of = [
+                by_robot[robot, setting_][name] / by_robot[robot, USUAL][name]
+                for robot in robots
+                if all(by_robot.get((robot, s), {}).get(name) for s in (setting_, USUAL))
+            ]
+            ends = f"{statistics.median(of):.2f} ({min(of):.2f} to {max(of):.2f})" if of else "-"
+            cells.append(ends)
+        lines.append(f"| {setting_} | " + " | ".join(cells) + " |")
+    return [*lines, ""]
 
 
 def _columns(one: dict[str, Any]) -> list[str]:

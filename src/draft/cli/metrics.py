@@ -26,8 +26,10 @@ from draft.cli.options import (
 from draft.cli.settings_options import with_options
 from draft.design import Design
 from draft.errors import DraftError
+from draft.learn.measuring.bands import mass_bands
 from draft.learn.measuring.evaluation_options import SeeingPolicy
 from draft.metrics import LEARNED, METRICS, find, of_design, of_model
+from draft.metrics.learned import PREFIX
 from draft.metrics.statics import joint_margins
 from draft.values import scalar
 
@@ -151,6 +153,9 @@ def _print(
             "[dim]learned metrics have no value where the robot falls, and of designs that are "
             "refused or cannot walk[/]\n"
         )
+    known = [name.removeprefix(PREFIX) for name in found if name in LEARNED]
+    if bands := mass_bands(known):
+        out.print(f"{bands}\n", style="dim", markup=False)
     if outside:
         words = f"the learned metrics are of a design {outside}; sweeps and searches need --outside"
         out.print(Text(f"{words}\n", style="yellow"))

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from draft.cli.display.lines import Lines
 from draft.cli.display.verdict import console
+from draft.learn.measuring.bands import mass_bands
 from draft.learn.measuring.evaluation_options import Extras
 from draft.learn.measuring.summary import Measured, Summary, Supply
 from draft.learn.measuring.utilisation import NEAR, Limiting
@@ -60,6 +61,9 @@ def show(summaries: Sequence[Summary]) -> None:
         of = [summary for summary in summaries if summary.stage == stage]
         rows = [row for summary in of for row in _designs(summary)]
         out.print(_table(stage, rows))
+        known = {name: None for _, one in rows for name, x in one.scalars.items() if x is not None}
+        if bands := mass_bands(name for name in known if name in CAPABILITIES):
+            out.print(bands, style="dim", markup=False)
         for heading, numbers in rows:
             for reason, names in _grouped(numbers.reasons).items():
                 out.print(f"{heading}: no {', '.join(names)}: {reason}", markup=False)

@@ -1,0 +1,37 @@
+"""Bands of capabilities by predicted masses are those of the real robots that were measured."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from draft.learn.measuring.bands import mass_band, mass_bands
+
+ROBOTS = Path(__file__).parents[3] / "examples/results/real_robots"
+
+
+@pytest.mark.parametrize("name", ["top_speed", "kick", "cost_of_transport"])
+def test_a_band_holds_the_share_of_the_robots_that_it_claims(name: str) -> None:
+    ratios = []
+    for path in ROBOTS.glob("*.json"):
+        one = json.loads(path.read_text(encoding="utf-8"))
+        values = [one[arm].get(name, {}).get("value") for arm in ("predicted", "maker")]
+        if all(values):
+            ratios.append(values[0] / values[1])
+    band = mass_band(name)
+    assert band is not None
+    inside = [abs(math.log(ratio)) <= math.log(band.fold) + 1e-4 for ratio in ratios]
+    assert band.robots == len(ratios) >= 10
+    assert sum(inside) / len(inside) >= band.share
+
+
+def test_the_sentence_names_capabilities_and_robots() -> None:
+    words = mass_bands(["eta", "top_speed", "step"])
+    assert words.startswith("masses are predictions, for nine of ten real robots good to: ")
+    assert "top speed within 1." in words
+    assert "step within 1." in words
+    assert "η" not in words
+    assert mass_bands(["eta"]) == ""
