@@ -115,7 +115,9 @@ class Actuator(Quantities):
     @property
     def copper_loss(self) -> Value:
         """Heat of the motor per torque squared [W/(N m)^2], see `draft.laws.limits`."""
-        return copper_loss(self.peak_torque, self.no_load_speed, self.corner_speed)
+        line = self.peak_torque, self.no_load_speed, self.corner_speed
+        surface = 2.0 * PI * self.radius * (self.radius + self.length)
+        return copper_loss(*line, self.rated_torque, surface)
 
     def available(self, speed: Value) -> Value:
         """Torque available at a speed in the direction of the torque [N m]; zero or more.

@@ -14,8 +14,11 @@ from pathlib import Path
 
 from draft.laws.law import Law
 from draft.laws.torque_speed import stall_torque
-from draft.values import Value, divide, maximum, power, sqrt, where
+from draft.values import Value, divide, maximum, minimum, power, sqrt, where
 
+# Heat that a housing gives off [W/m2]: free convection and radiation of 12 W/(m2 K) together, as in
+# textbooks of heat transfer (Incropera et al., table 1.1 and eq. 1.9), 75 K above its surroundings.
+COOLING = 12.0 * 75.0
 FILE = Path(__file__).resolve().parent / "data" / "limits.json"
 
 
@@ -51,19 +54,32 @@ def limits() -> Limits:
     return Limits(**{name: Law.read(name, law) for name, law in record.items()})
 
 
-def copper_loss(peak_torque: Value, no_load_speed: Value, corner_speed: Value) -> Value:
-    """Heat of a motor per torque squared [W/(N m)^2]: w_no_load / tau_stall of a linear motor.
+def copper_loss(
+    peak_torque: Value,
+    no_load_speed: Value,
+    corner_speed: Value,
+    rated_torque: Value | None = None,
+    surface: Value | None = None,
+) -> Value:
+    """Heat of a motor per torque squared [W/(N m)^2], the lesser of two estimates.
 
-    A motor without a corner takes that of the trend: every drive limits its current, and a straight
-    line would have the motor turn tau_peak w_no_load into heat at standstill.
+    By its line: w_no_load / tau_stall of a linear motor, with the corner of the trend where it has
+    none, as every drive limits its current. That is an upper bound, since most of the voltage that
+    is lacking at the corner is inductive. By its rating: at its rated torque it gives off what its
+    housing can, `COOLING` for each square metre.
 
     Args:
         peak_torque: [N m].
         no_load_speed: [rad/s].
         corner_speed: highest speed with full peak torque [rad/s]; 0 for a straight line.
+        rated_torque: [N m]; None for the line alone.
+        surface: of its housing [m2]; None for the line alone.
     """
     corner = where(corner_speed > 0, corner_speed, limits().corner(no_load_speed))
-    return no_load_speed / stall_torque(peak_torque, no_load_speed, corner)
+    by_line = no_load_speed / stall_torque(peak_torque, no_load_speed, corner)
+    if rated_torque is None or surface is None:
+        return by_line
+    return minimum(by_line, COOLING * surface / (rated_torque * rated_torque))
 
 
 def hold_time(share: Value, fold: float = 1.0) -> Value:

@@ -116,7 +116,7 @@ CAPABILITIES = {
     "cost_of_transport": Capability(
         "1", "cost of transport", "Electrical power per weight and speed, at top speed.",
         _ENERGY, better="less",
-        formula="P / (m g v), P = sum of max(tau w, 0) + tau^2 w_NL / tau_stall",
+        formula="P / (m g v), P = sum of max(tau w, 0) + k tau^2, and the electronics",
     ),
     "endurance": Capability(
         "h", "lasts", "Time that the battery lasts, at the sustained speed.", _ENERGY

@@ -173,16 +173,15 @@ def foot_speed(design: Design) -> Value:
 
 @metric(
     unit="W/kg",
-    formula="sum of tau^2 w_no_load / tau_stall / M",
-    source="arXiv 2609.38405, efficiency; tau_stall of the motor's corner, docs/limits.md",
+    formula="sum of k tau^2 / M",
+    source="heat k tau^2 of a motor, docs/limits.md",
     better="less",
 )
 def cost_of_standing(design: Design) -> Value:
     """Copper loss of the motors of the legs in the crouch, per mass [W/kg].
 
-    At standstill without a current limit a motor draws tau_stall w_no_load, all of it copper loss,
-    which grows with the square of the torque. The stall torque follows from the corner that the
-    class states, or else from the trend's.
+    The heat of a torque is that of `draft.laws.limits.copper_loss`: of the motor's torque-speed
+    line, or of what its housing gives off at the rated torque, the lesser.
     """
     found = loads(design)
     if not found:

@@ -66,6 +66,7 @@ class LeggedRobot:
         battery: energy of a stated battery, and the ends of its 90 % band [Wh]; () if the design
             states none.
         rated_torque: rated torque of each joint [N m]; () if all are those of the trend.
+        motor_heat: heat of each motor per torque squared [W/(N m)^2]; () for that of its line.
         electronics: stated power of computers, sensors and idle drives [W]; () if the design states
             none.
         block: half side and middle of a payload [m], which is not in the text; () without one.
@@ -95,6 +96,7 @@ class LeggedRobot:
     battery: tuple[float, ...] = ()
     electronics: tuple[float, ...] = ()
     rated_torque: tuple[float, ...] = ()
+    motor_heat: tuple[float, ...] = ()
     block: tuple[float, ...] = ()
 
     @property
@@ -112,6 +114,8 @@ class LeggedRobot:
     @property
     def copper_loss(self) -> tuple[float, ...]:
         """Heat of each motor per torque squared [W/(N m)^2], see `draft.laws.limits`."""
+        if self.motor_heat:
+            return self.motor_heat
         speeds = self.corner_speed or (0.0,) * len(self.joints)
         return tuple(scalar(copper_loss(*of)) for of in self._motors(speeds))
 
@@ -173,7 +177,7 @@ class LeggedRobot:
 
 # Defaults of the fields that were added later: older records lack them.
 _LATER: dict[str, Any] = dict.fromkeys(
-    ("corner_speed", "battery", "electronics", "rated_torque", "block"), ()
+    ("corner_speed", "battery", "electronics", "rated_torque", "motor_heat", "block"), ()
 )
 
 
@@ -227,6 +231,7 @@ def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
         rated_torque=known_ratings(
             _of_actuators(design, "rated_torque"), _of_actuators(design, "peak_torque")
         ),
+        motor_heat=_of_actuators(design, "copper_loss"),
     )
 
 

@@ -92,6 +92,7 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
             corners(row) for row in _tuples(_table(design, [m.corner_speed for m in motors])[rows])
         ],
         "no_load_speed": _tuples(_table(design, [m.no_load_speed for m in motors])[rows]),
+        "motor_heat": _tuples(_table(design, [m.copper_loss for m in motors])[rows]),
         "battery": _stated(design, stated_battery(design), rows),
         "electronics": _stated(design, stated_electronics(design), rows),
         "rated_torque": [

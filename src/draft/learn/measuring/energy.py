@@ -2,8 +2,7 @@
 
 The electrical power of a joint is its mechanical power where it drives the joint, plus the heat of
 its motor. A joint that brakes returns nothing to the battery unless a share of regeneration is
-given. The heat is tau^2 w_NL / tau_stall, the copper loss of a linear motor whose corner is the
-stated one or the trend's (`draft.laws.limits.copper_loss`). Cost of transport, endurance and
+given. The heat is that of `draft.laws.limits.copper_loss`. Cost of transport, endurance and
 range are those of the whole robot: the power of its electronics is added.
 """
 
