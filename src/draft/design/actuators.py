@@ -150,7 +150,7 @@ class _Sizer:
         stated: Mapping[str, Value],
         part: Part | None,
         laws: Laws,
-        errors: Mapping[str, float],
+        errors: Mapping[str, Value],
     ) -> None:
         self.value: dict[str, Value] = dict(stated)
         self.origin: dict[str, Origin] = dict.fromkeys(stated, _STATED)
@@ -206,8 +206,7 @@ class _Sizer:
             return
         inverted = name in _INVERSE
         trend = self.laws.law(law_name or _INVERSE.get(name, name))
-        if self.errors.get(trend.name):
-            trend = trend.scaled(math.exp(self.errors[trend.name]))
+        error = self.errors.get(trend.name, 0.0)
         inputs = (_INVERSE[name],) if inverted else trend.inputs
         call = trend.inverse if inverted else trend
         arguments = [self.value[i] for i in inputs]
@@ -215,7 +214,13 @@ class _Sizer:
         own = getattr(part, name) if part else None
         if part is None or own is None:
             formula = f"inverse of {trend.formula}" if inverted else trend.formula
-            self.value[name] = call(*arguments)
+            if some(error != 0.0):
+                # The law errs, so that its inverse is that at a smaller value.
+                fold = exp(error)
+                value = call(arguments[0] / fold) if inverted else call(*arguments) * fold
+            else:
+                value = call(*arguments)
+            self.value[name] = value
             self.origin[name] = Origin("trend", formula, trend.name, inputs)
             return
         reference = [self.part_value(part, i) for i in inputs]
@@ -234,8 +239,8 @@ class _Sizer:
         Two modules of one vendor and family that differ by 10 to 25 % scatter about the law almost
         as much as unrelated ones, so the error grows to its full size over the first 10 %.
         """
-        error = self.errors.get(quantity)
-        return exp(error * minimum(1.0, abs(log(ratio)) / _FULL)) if error else 1.0
+        error = self.errors.get(quantity, 0.0)
+        return exp(error * minimum(1.0, abs(log(ratio)) / _FULL)) if some(error != 0.0) else 1.0
 
     def part_value(self, part: Part, quantity: str) -> Value:
         """Value of a part, or that of the trend if the vendor does not publish it."""
@@ -256,7 +261,7 @@ def size(
     part: Part | None,
     where: Location | None = None,
     laws: Laws | None = None,
-    errors: Mapping[str, float] | None = None,
+    errors: Mapping[str, Value] | None = None,
     by_trend: Collection[str] = (),
 ) -> Actuator:
     """Size an actuator class.

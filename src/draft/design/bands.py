@@ -68,7 +68,7 @@ def actuator_bands(actuator: Actuator, share: float = 0.9) -> dict[str, Band]:
         A band for each quantity that depends on a trend; stated and measured ones have none.
     """
     widths, within = half_widths(actuator, share), {}
-    if any(_small_sigma(actuator, law) is not None for law in _SMALL):
+    if any(small_sigma_of(actuator, law) is not None for law in _SMALL):
         within = half_widths(actuator, share, ("mass",), outside=False)
     bands = {
         quantity: Band(value * exp(-width), value * exp(within.get(quantity, width)))
@@ -106,7 +106,7 @@ def half_widths(
     laws = actuator.laws
     own: dict[str, Value] = {law: math.log(laws.error(law).band(share)) for law in slopes}
     for law in own if outside else ():
-        sigma = _small_sigma(actuator, law)
+        sigma = small_sigma_of(actuator, law)
         if sigma is not None:
             own[law] = maximum(own[law], quantile(share) * sigma)
     variance: dict[str, Value] = {}
@@ -119,7 +119,7 @@ def half_widths(
     return {q: sqrt(variance[q]) for q in actuator.quantities if q in variance}
 
 
-def _small_sigma(actuator: Actuator, law: str) -> Value | None:
+def small_sigma_of(actuator: Actuator, law: str) -> Value | None:
     """Standard deviation of a law below the torques of its data, 0 within; None where none is."""
     if law not in _SMALL:
         return None
@@ -149,7 +149,7 @@ def small_actuators(design: Design) -> list[tuple[Value, Value]]:
     found: list[tuple[Value, Value]] = []
     for name, count in Counter(b.actuator.name for b in design.bodies if b.actuator).items():
         actuator = design.actuators[name]
-        sigma = _small_sigma(actuator, "mass")
+        sigma = small_sigma_of(actuator, "mass")
         if sigma is None or "mass" not in sensitivities(actuator, ("mass",)):
             continue
         found.append((count * actuator.mass / design.actuator_mass, sigma))

@@ -15,9 +15,11 @@ from draft.design.battery import trunk_with_battery
 from draft.design.cached import hand_on
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.filter import inspect
+from draft.design.law_errors import LawErrors
 from draft.design.overrides import Table, read_table
 from draft.design.parts import Link, Placement, mirrored, placed, read_link, read_placement
 from draft.design.plan import Plan, plan
+from draft.design.reuse import Reuse
 from draft.design.segments import Skeleton, drawn_radii, weigh
 from draft.design.structure_law import leg_of_trunk, structure_laws
 from draft.errors import DraftError, Location, Problem, ResolveError
@@ -33,7 +35,7 @@ from draft.spec.primitives.loft import Loft
 from draft.spec.primitives.root import TrunkPart, make_trunk
 from draft.spec.spec import ActuatorClass, Parameter
 from draft.spec.tree import Signs
-from draft.values import Value, is_array
+from draft.values import Value, exp, is_array, some
 
 T = TypeVar("T")
 
@@ -43,12 +45,16 @@ def resolve(
     values: Mapping[str, Value | str | None],
     label: str = "custom",
     places: Mapping[str, Location] | None = None,
+    errors: LawErrors | None = None,
 ) -> Design:
-    """Evaluate every number of a spec; see `Spec.resolve`."""
+    """Evaluate every number of a spec; see `Spec.resolve`.
+
+    With errors, the laws err by these factors.
+    """
     p = plan(spec)
     table = read_table(spec, values, places or {}, p.order)
     with np.errstate(all="ignore"):
-        return _Resolver(spec, p, table).run(label, values)
+        return _Resolver(spec, p, table, errors).run(label, values)
 
 
 def trunk_by_law(design: Design) -> TrunkPart:
@@ -63,6 +69,14 @@ def trunk_by_law(design: Design) -> TrunkPart:
     volume = trunk.loft.volume
     density = structure_laws(design).calibrated(volume, leg)
     return replace(trunk, density=density, mass=density * volume)
+
+
+def _erring(trunk: TrunkPart, error: Value) -> TrunkPart:
+    """The trunk, where the law of its density errs; a stated density does not."""
+    if trunk.density_stated or not some(error != 0.0):
+        return trunk
+    fold = exp(error)
+    return replace(trunk, density=trunk.density * fold, mass=trunk.mass * fold)
 
 
 def top_of(loft: Loft) -> tuple[Value, Value, Value]:
@@ -83,11 +97,14 @@ def _quantities(actuator: Actuator) -> dict[str, Value]:
 
 
 class _Resolver:
-    def __init__(self, spec: Spec, p: Plan, table: Table) -> None:
+    def __init__(self, spec: Spec, p: Plan, table: Table, errors: LawErrors | None) -> None:
         self.spec = spec
         self.plan = p
         self.table = table
-        self.reuse = p.reuse(table.count)
+        self.errors = errors or LawErrors()
+        self.count = table.count or self.errors.count
+        # With errors, nothing is that of the design before.
+        self.reuse = p.reuse(self.count) if errors is None else Reuse(keeps=False)
         self.env: dict[str, Value] = {}
         self.r = Evaluator(self.env)
         self.actuators: dict[str, Actuator] = {}
@@ -119,7 +136,7 @@ class _Resolver:
             spec=spec,
             label=label,
             values={key: self.table.arrays.get(key, value) for key, value in values.items()},
-            count=self.table.count,
+            count=self.count,
             parameters={name: self.env[name] for name in spec.parameters},
             actuators={name: self.actuators[name] for name in spec.actuators},
             bodies=bodies,
@@ -132,7 +149,7 @@ class _Resolver:
             },
             electronics_stated=self.electronics(spec.electronics_power),
         )
-        design = replace(design, trunk=trunk_by_law(design))
+        design = replace(design, trunk=_erring(trunk_by_law(design), self.errors.trunk))
         design = replace(design, trunk=trunk_with_battery(design))
         judged = replace(design, findings=inspect(design, p, self.r.invalid))
         hand_on(design, judged)
@@ -234,7 +251,8 @@ class _Resolver:
         numbers = (self.reuse.equal((name, each), value) for each, value in stated.items())
 
         def sized(*_: object) -> Actuator:
-            return size(name, stated, part, actuator.where, self.plan.laws, None, by_trend)
+            errors = self.errors.actuators.get(name)
+            return size(name, stated, part, actuator.where, self.plan.laws, errors, by_trend)
 
         try:
             return self.reuse.result((name, "sized"), sized, part, by_trend, names, *numbers)
@@ -293,7 +311,7 @@ class _Resolver:
         for k, segment in enumerate(p.segments):
             weighed = reuse.result(
                 ("segment", k),
-                lambda *_, segment=segment: weigh(segment, skeleton, self.r),
+                lambda *_, segment=segment: weigh(segment, skeleton, self.r, self.errors.segments),
                 *(skeleton.links[i] for i in segment.members),
                 *(skeleton.places[i] for i in segment.path),
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from draft.geometry import Frame, Vector
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
 from draft.spec.primitives.basic import MemberPart
-from draft.values import Value, clip, is_array, maximum, sqrt
+from draft.values import Value, clip, exp, is_array, maximum, some, sqrt
 
 # Range of the centre of a rod of two halves: one half has no mass at its ends.
 CENTRES = (0.25, 0.75)
@@ -60,7 +60,9 @@ class Weighed:
     ends: list[Value]
 
 
-def weigh(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Weighed:
+def weigh(
+    segment: Segment, skeleton: Skeleton, r: Evaluator, errors: Mapping[str, Value]
+) -> Weighed:
     """Mass of a segment, predicted from its length or stated, and its distribution.
 
     The sphere or plate at the end takes its mass first; the members share the rest by length. An
@@ -73,6 +75,8 @@ def weigh(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Weighed:
         mass = stated
     else:
         mass = _trend_mass(segment, length, skeleton)
+        error = errors.get(segment.trend or "", 0.0)
+        mass = mass * exp(error) if some(error != 0.0) else mass
     density = skeleton.plan.population.end_density
     ends: list[Value] = [
         k.end.weigh(mass, density) if k.end is not None and k.end.of_segment else 0.0 for k in own

@@ -16,6 +16,7 @@ from draft.spec.tree import Body
 
 if TYPE_CHECKING:
     from draft.design import Design
+    from draft.design.law_errors import LawErrors
     from draft.values import Value
 
 
@@ -150,6 +151,8 @@ class Spec:
         self,
         values: Mapping[str, Value | str | None] | str | Path | None = None,
         more: Mapping[str, Value | str | None] | None = None,
+        *,
+        errors: LawErrors | None = None,
     ) -> Design:
         """Evaluate every number: size actuators, weigh links, run the design filter.
 
@@ -160,6 +163,7 @@ class Spec:
                 read the number that it replaces: `"1.2*thigh_length"`, or `"*1.2"`. `payload` [kg]
                 puts a block on the trunk, see `draft.spec.payload`.
             more: further values, which override those, and may refer to them.
+            errors: errors of the laws, see `draft.design.law_errors`; None for none.
 
         Returns:
             The design; with arrays, N designs of this topology at once.
@@ -185,4 +189,5 @@ class Spec:
             label = "custom" if table or more else "default"
         if more:
             table = merged(table, more)
-        return resolve(with_payload(self, table), table, label=label, places=places)
+        spec = with_payload(self, table)
+        return resolve(spec, table, label=label, places=places, errors=errors)
