@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from draft.design import Design, Finding
     from draft.explore.optimise import optimise
     from draft.explore.screen import screen
+    from draft.explore.sensitivity import sensitivity
     from draft.explore.sweep import sweep
     from draft.imports.importer import import_robot
     from draft.learn.measuring.evaluation import evaluate
@@ -69,6 +70,7 @@ __all__ = [
     "real_robot",
     "report",
     "screen",
+    "sensitivity",
     "shipped",
     "study",
     "surface",
@@ -94,6 +96,7 @@ _MODULES = {
     "real_robot": "draft.validation.compare",
     "report": "draft.reporting.report",
     "screen": "draft.explore.screen",
+    "sensitivity": "draft.explore.sensitivity",
     "shipped": "draft.spec",
     "study": "",
     "surface": "draft.learn.measuring.surface",

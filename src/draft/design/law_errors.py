@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from draft.values import Value
+from draft.values import Array, Value
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,21 @@ class LawErrors:
         return None
 
     def repeated(self, times: int) -> LawErrors:
-        """The errors of N designs for `times` designs each, in blocks of N."""
+        """The errors `times` times, one after another, of N designs each."""
+        return self._each(lambda x: np.tile(x, times))
 
-        def tiled(value: Value) -> Value:
-            return np.tile(value, times) if isinstance(value, np.ndarray) else value
+    def after(self, count: int) -> LawErrors:
+        """The errors after those of `count` designs whose laws do not err."""
+        return self._each(lambda x: np.concatenate([np.zeros(count), x]))
 
-        return LawErrors(
-            {name: {law: tiled(x) for law, x in of.items()} for name, of in self.actuators.items()},
-            {name: tiled(x) for name, x in self.segments.items()},
-            tiled(self.trunk),
-        )
+    def _each(self, change: Callable[[Array], Array]) -> LawErrors:
+        """The errors of N designs, changed."""
+
+        def changed(value: Value) -> Value:
+            return change(value) if isinstance(value, np.ndarray) else value
+
+        of_actuators = {
+            name: {law: changed(x) for law, x in of.items()} for name, of in self.actuators.items()
+        }
+        segments = {name: changed(x) for name, x in self.segments.items()}
+        return LawErrors(of_actuators, segments, changed(self.trunk))

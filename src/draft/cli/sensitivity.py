@@ -1,0 +1,141 @@
+"""`draft sensitivity`: what a change of each number of a design does to its metrics."""
+
+from __future__ import annotations
+
+import json as jsons
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+from rich.table import Table
+from rich.text import Text
+
+from draft.cli.display.verdict import console, verdict
+from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
+from draft.metrics import find
+from draft.values import brief
+
+if TYPE_CHECKING:
+    from draft.explore.sensitivity import Sensitivity
+
+# Metrics that are printed unless some are named; the JSON has all.
+USUAL = ("mass", "payload_rated", "jump_height", "top_speed", "standing_power")
+_NUMBER, _CELL = 44, 28  # Width of the first columns of a table, and of a metric.
+
+
+def main(
+    reference: DesignArgument,
+    /,
+    *,
+    of: Annotated[
+        tuple[str, ...],
+        tyro.conf.arg(
+            metavar="METRIC ...",
+            help="Metrics, of those that need no model ('draft metrics' lists them).",
+            help_behavior_hint=f"(default: {', '.join(USUAL)})",
+        ),
+    ] = (),
+    by: Annotated[
+        tuple[str, ...],
+        tyro.conf.arg(
+            metavar="NAME ...",
+            help="Parameters, and quantities of actuators such as actuators.leg.peak_torque.",
+            help_behavior_hint="(default: all that the design states as numbers)",
+        ),
+    ] = (),
+    design: DesignName = None,
+    values: Values = (),
+    payload: Payload = None,
+    seed: Annotated[
+        int, tyro.conf.arg(metavar="N", help="Seed of the samples of the laws' errors.")
+    ] = 0,
+    figure: Annotated[
+        Path | None,
+        tyro.conf.arg(
+            metavar="FILE",
+            help="Draw the effects of the steps as bars (extra figures): a .png, .pdf or .svg.",
+            help_behavior_hint="(default: no figure)",
+        ),
+    ] = None,
+    json: JsonOutput = False,
+) -> int:
+    """Show what a change of each number of a design does to its metrics, and how sure that is."""
+    from draft.explore.sensitivity import sensitivity
+
+    resolved, _ = open_design(reference, design, values, payload)
+    found = sensitivity(resolved, of or (() if json else USUAL), by, seed=seed)
+    if figure is not None:
+        from draft.explore.sensitivity_figure import save
+
+        save(found, figure)
+    if json:
+        print(jsons.dumps(found.record(), indent=2, allow_nan=False))
+        return 0
+    _print(found)
+    if figure is not None:
+        print(figure)
+    return 0
+
+
+def _print(found: Sensitivity) -> None:
+    out = console()
+    out.print(Text(verdict(found.design), style="bold"))
+    shown = [i for i, still in enumerate(found.still) if not still]
+    wide = max(1, (out.width - _NUMBER) // _CELL)
+    for start in range(0, len(found.metrics), wide):
+        chosen = range(start, min(start + wide, len(found.metrics)))
+        out.print("", _table(found, shown, chosen))
+    if still := [name for name, one in zip(found.names, found.still, strict=True) if one]:
+        out.print(f"\nwithout effect: {', '.join(still)}", markup=False)
+    for i in shown:
+        for step, text in ((0, "less"), (2, "more")):
+            if found.accepted[i, step] != found.accepted[i, 1]:
+                word = "accepts" if found.accepted[i, step] else "refuses"
+                size = f"{brief(found.steps[i])} {found.units[i]}".rstrip()
+                out.print(f"{found.names[i]}: {size} {text}, and the filter {word} it")
+
+
+def _table(found: Sensitivity, shown: list[int], chosen: range) -> Table:
+    """One row per number: its step, and of each metric the change and the change of 1 %."""
+    title = "change for a step (90 % band of it by the laws' errors), and for 1 % more"
+    table = Table(box=None, pad_edge=False, title=title, title_justify="left", title_style="dim")
+    table.add_column("number", style="bold", no_wrap=True)
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("step", justify="right", no_wrap=True)
+    for k in chosen:
+        metric = find(found.metrics[k])
+        unit = "" if metric.unit == "1" else f" {metric.unit}"
+        table.add_column(f"{metric.name}\n{brief(found.base[k])}{unit}", justify="right")
+    for i in shown:
+        size = f"+{brief(found.steps[i])} {found.units[i]}".rstrip()
+        cells = (_cell(found, i, k) for k in chosen)
+        table.add_row(_short(found.names[i]), brief(found.values[i]), size, *cells)
+    return table
+
+
+def _cell(found: Sensitivity, i: int, k: int) -> str:
+    change = found.step_up[i, k]
+    other = -found.step_down[i, k]
+    if math.isnan(change) and math.isnan(other):
+        return "-"
+    if change == other == 0:
+        return ""
+    text = _signed(change)
+    if found.kinked[i, k]:
+        text += f" | {_signed(other)}"
+    low, high = found.low[i, k], found.high[i, k]
+    if not math.isnan(low) and _signed(low) != _signed(high):
+        text += f" ({_signed(low)}..{_signed(high)})"
+    percent = found.up[i, k]
+    return text if math.isnan(percent) else f"{text}\n{100 * percent:+.2g} %"
+
+
+def _signed(x: float) -> str:
+    if math.isnan(x):
+        return "-"
+    return f"{'+' if x > 0 else ''}{brief(x)}" if x else "0"
+
+
+def _short(name: str) -> str:
+    return name.removeprefix("actuators.")
