@@ -45,7 +45,8 @@ def offered(completion: Path, *words: str) -> list[str]:
     ("words", "expected"),
     [
         (("bu",), ["build"]),
-        (("s",), ["show", "studio", "screen", "sweep", "study", "surface", "survey", "schema"]),
+        (("sur",), ["surface", "survey"]),
+        (("se",), ["sensitivity"]),
         (("--v",), ["--version"]),
         (("--install-completion", ""), ["bash", "zsh"]),
         (("show", "b"), ["bear"]),
