@@ -28,6 +28,7 @@ from draft.lazy import on_first_use
 if TYPE_CHECKING:
     from draft import extend, metrics, study
     from draft.design import Design, Finding
+    from draft.explore.comparison import compare
     from draft.explore.optimise import optimise
     from draft.explore.screen import screen
     from draft.explore.sensitivity import sensitivity
@@ -57,6 +58,7 @@ __all__ = [
     "ResolveError",
     "Spec",
     "SpecError",
+    "compare",
     "compare_twin",
     "evaluate",
     "export",
@@ -83,6 +85,7 @@ _MODULES = {
     "Finding": "draft.design",
     "Model": "draft.model",
     "Spec": "draft.spec",
+    "compare": "draft.explore.comparison",
     "compare_twin": "draft.twins.compare",
     "evaluate": "draft.learn.measuring.evaluation",
     "export": "draft.model.export",

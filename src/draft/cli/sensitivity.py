@@ -121,17 +121,18 @@ def _cell(found: Sensitivity, i: int, k: int) -> str:
         return "-"
     if change == other == 0:
         return ""
-    text = _signed(change)
+    text = signed(change)
     if found.kinked[i, k]:
-        text += f" | {_signed(other)}"
+        text += f" | {signed(other)}"
     low, high = found.low[i, k], found.high[i, k]
-    if not math.isnan(low) and _signed(low) != _signed(high):
-        text += f" ({_signed(low)}..{_signed(high)})"
+    if not math.isnan(low) and signed(low) != signed(high):
+        text += f" ({signed(low)}..{signed(high)})"
     percent = found.up[i, k]
     return text if math.isnan(percent) else f"{text}\n{100 * percent:+.2g} %"
 
 
-def _signed(x: float) -> str:
+def signed(x: float) -> str:
+    """Text of a change, with its sign."""
     if math.isnan(x):
         return "-"
     return f"{'+' if x > 0 else ''}{brief(x)}" if x else "0"

@@ -23,20 +23,23 @@ from draft.values import Array, Value, scalar
 _SHARE = 0.9  # Share of the band whose half-width gives a law's standard deviation.
 
 
-def sample_errors(design: Design, count: int, seed: int = 0) -> LawErrors:
-    """Draw errors of the laws of one design.
+def sample_errors(design: Design, count: int, seed: int = 0, *others: Design) -> LawErrors:
+    """Draw errors of the laws of one design, or of several of one robot.
 
     Args:
         design: one design; its laws, and whether an actuator is below their data, are taken from
             it.
         count: number of samples N.
         seed: seed of the samples; equal seeds give equal ones.
+        others: further designs, which may follow laws that the first does not.
     """
     rng = np.random.default_rng(seed)
+    designs = (design, *others)
     population = structure_laws(design)
-    actuators = {}
+    actuators: dict[str, dict[str, Value]] = {}
     for name, actuator in design.actuators.items():
-        laws = list(sensitivities(actuator))
+        of_all = [one.actuators[name] for one in designs if name in one.actuators]
+        laws = list(dict.fromkeys(law for one in of_all for law in sensitivities(one)))
         if not laws:
             continue  # Every number of it is measured.
         width = [math.log(actuator.laws.error(law).band(_SHARE)) for law in laws]
@@ -48,12 +51,14 @@ def sample_errors(design: Design, count: int, seed: int = 0) -> LawErrors:
             law: _downwards(drawn[:, k], sigma[k], small_sigma_of(actuator, law))
             for k, law in enumerate(laws)
         }
-    kinds = dict.fromkeys(one.trend for one in design.segments if one.trend is not None)
+    trends = (segment.trend for one in designs for segment in one.segments)
     segments = {
-        kind: rng.standard_normal(count) * population.segments[kind].sigma for kind in kinds
+        kind: rng.standard_normal(count) * population.segments[kind].sigma
+        for kind in dict.fromkeys(trends)
+        if kind is not None
     }
     trunk: Value = 0.0
-    if not design.trunk.density_stated:
+    if not all(one.trunk.density_stated for one in designs):
         trunk = rng.standard_normal(count) * population.trunk_law.sigma
     return LawErrors(actuators, segments, trunk)
 

@@ -128,8 +128,8 @@ def sensitivity(
 
         >>> found = draft.sensitivity(draft.load("quadruped").resolve("bear"), of=["mass"])
         >>> i = found.names.index("actuators.leg.peak_torque")
-        >>> round(100 * found.up[i, 0], 2)  # per cent of mass for one per cent of torque
-        0.34
+        >>> round(100 * float(found.up[i, 0]), 2)  # per cent of mass for one per cent of torque
+        0.36
 
     Args:
         design: one design.
