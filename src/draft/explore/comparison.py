@@ -183,10 +183,8 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
 def _differing(a: Design, b: Design) -> tuple[dict[str, object], dict[str, object]]:
     """Settings that differ, in both designs."""
     # A design without a payload has one of zero.
-    loaded = [one.spec.payload is not None for one in (a, b)]
-    a, b = (
-        one if any(loaded) <= own else _loaded(one) for one, own in zip((a, b), loaded, strict=True)
-    )
+    if any(one.spec.payload is not None for one in (a, b)):
+        a, b = (one if one.spec.payload is not None else _loaded(one) for one in (a, b))
     numbers = [stated_numbers(one) for one in (a, b)]
     before, after = {}, {}
     for name in dict.fromkeys([*a.values, *b.values, *numbers[0], *numbers[1]]):
