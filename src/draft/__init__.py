@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from draft.explore.optimise import optimise
     from draft.explore.screen import screen
     from draft.explore.sensitivity import sensitivity
+    from draft.explore.solve import solve
     from draft.explore.sweep import sweep
     from draft.imports.importer import import_robot
     from draft.learn.measuring.evaluation import evaluate
@@ -74,6 +75,7 @@ __all__ = [
     "screen",
     "sensitivity",
     "shipped",
+    "solve",
     "study",
     "surface",
     "sweep",
@@ -101,6 +103,7 @@ _MODULES = {
     "screen": "draft.explore.screen",
     "sensitivity": "draft.explore.sensitivity",
     "shipped": "draft.spec",
+    "solve": "draft.explore.solve",
     "study": "",
     "surface": "draft.learn.measuring.surface",
     "sweep": "draft.explore.sweep",

@@ -35,6 +35,7 @@ COMMANDS = {
     "import": "Turn a robot's URDF or MJCF into a spec of your own.",
     "twin": "Compare a real robot with Draft's prediction of it.",
     "sensitivity": "Show what a change of each number of a design does to its metrics.",
+    "solve": "Find the nearest design that meets conditions, and why each number moved.",
     "compare": "Show designs side by side, and which changed number makes what difference.",
     "screen": "Screen very many designs by closed-form metrics and the filter, into one file.",
     "sweep": "Build very many designs and measure their models, into a folder of parts.",

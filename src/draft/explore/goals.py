@@ -106,14 +106,15 @@ def constraints(spec: Spec, texts: Sequence[str]) -> tuple[Constraint, ...]:
     found: list[Constraint] = []
     for text in texts:
         where.condition(spec, text, "`subject_to`")  # reports errors with their column
-        for node in _conjuncts(syntax_tree(text.strip()).body):
+        for node in conjuncts(syntax_tree(text.strip()).body):
             found.append(_constraint(spec, node))
     return tuple(found)
 
 
-def _conjuncts(node: ast.expr) -> list[ast.expr]:
+def conjuncts(node: ast.expr) -> list[ast.expr]:
+    """Parts of an `and`, or the node itself."""
     if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
-        return [part for value in node.values for part in _conjuncts(value)]
+        return [part for value in node.values for part in conjuncts(value)]
     return [node]
 
 

@@ -1,0 +1,141 @@
+"""`draft solve`: the nearest design that meets conditions."""
+
+from __future__ import annotations
+
+import json as jsons
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+import yaml
+from rich.table import Table
+from rich.text import Text
+
+from draft.cli import explore_options as x
+from draft.cli.display.verdict import console, verdict
+from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
+from draft.values import brief
+
+if TYPE_CHECKING:
+    from draft.design import Design
+    from draft.explore.solve import Solution
+
+NOT_MET = 1
+
+
+def main(
+    reference: DesignArgument,
+    conditions: Annotated[
+        tuple[str, ...],
+        tyro.conf.arg(
+            metavar="CONDITION ...",
+            help='Conditions on closed-form metrics, such as "top_speed >= 3" "mass <= 30".',
+            help_behavior_hint="(required)",
+        ),
+    ] = (),
+    /,
+    *,
+    vary: x.Vary = (),
+    keep: Annotated[
+        tuple[str, ...],
+        tyro.conf.arg(
+            metavar="NAME ...",
+            help="Numbers that stay as they are.",
+            help_behavior_hint="(default: none)",
+        ),
+    ] = (),
+    design: DesignName = None,
+    values: Values = (),
+    payload: Payload = None,
+    seed: Annotated[
+        int, tyro.conf.arg(metavar="N", help="Seed of the designs that are drawn.")
+    ] = 0,
+    out: Annotated[
+        Path | None,
+        tyro.conf.arg(
+            metavar="FILE.yaml",
+            help="Design file of the solution.",
+            help_behavior_hint="(default: out/DESIGN-solved.yaml)",
+        ),
+    ] = None,
+    json: JsonOutput = False,
+) -> int:
+    """Find the nearest accepted design that meets conditions, and say why each number moved.
+
+    The change is the root mean square of those of the numbers, each as a share of its range.
+    Without --vary every stated number may be halved to doubled, within the range of its parameter.
+    """
+    from draft import files
+    from draft.explore.solve import solve
+
+    resolved, _ = open_design(reference, design, values, payload)
+    found = solve(resolved, conditions, vary, keep, seed=seed)
+    path = None
+    if found.conflict is None and found.moved:
+        name = resolved.reference.replace(":", "-")
+        path = out or Path(f"out/{name}-solved.yaml")
+        files.write(path, _design_file(resolved, found, conditions))
+    if json:
+        print(jsons.dumps(_record(found, path), indent=2, allow_nan=False))
+    else:
+        _print(resolved, found, path)
+    return 0 if found.conflict is None else NOT_MET
+
+
+def _design_file(start: Design, found: Solution, conditions: tuple[str, ...]) -> str:
+    """Text of the design file: the values, and above them why each number moved."""
+    doc = f"Nearest to {start.reference} with {', '.join(conditions)}."
+    lines = []
+    for one in found.moved:
+        why = f"; else {'; '.join(one.why)}" if one.why else ""
+        lines.append(f"# {one.name}: {brief(one.before)} -> {brief(one.after)}{why}")
+    values = dict(start.values) | {one.name: one.after for one in found.moved}
+    document = {"doc": doc, "values": values}
+    text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=1000)
+    return "\n".join([*lines, text])
+
+
+def _print(start: Design, found: Solution, path: Path | None) -> None:
+    out = console()
+    if not found.moved and found.conflict is None:
+        out.print(f"{start.reference} meets all conditions; nothing was changed")
+        return
+    if found.conflict is not None:
+        together = len(found.conflict.conditions) > 1
+        words = "exclude each other" if together else "cannot be met"
+        out.print(f"no design of these ranges: {words}", style="bold red")
+        for text in found.conflict.conditions:
+            out.print(f"  {text}", markup=False)
+        out.print("the design that misses least misses")
+        for text in found.conflict.misses:
+            out.print(f"  {text}", markup=False)
+    else:
+        out.print(Text(verdict(found.design), style="bold green"))
+    table = Table(box=None, pad_edge=False)
+    table.add_column("number", style="bold", no_wrap=True)
+    table.add_column("from", justify="right", no_wrap=True)
+    table.add_column("to", justify="right", no_wrap=True)
+    table.add_column("" if found.conflict else "without this change", style="dim")
+    for one in found.moved:
+        row = one.name, brief(one.before), brief(one.after), "\n".join(one.why)
+        table.add_row(*(Text(cell) for cell in row))
+    out.print("", table, "")
+    out.print(f"change {100 * found.change:.3g} % of the ranges, {found.tried:,} designs computed")
+    if path is not None:
+        out.print(str(path), markup=False)
+
+
+def _record(found: Solution, path: Path | None) -> dict[str, Any]:
+    conflict = found.conflict
+    return {
+        "met": conflict is None,
+        "change": found.change,
+        "moved": [
+            {"name": one.name, "from": one.before, "to": one.after, "why": list(one.why)}
+            for one in found.moved
+        ],
+        "excluded_together": [] if conflict is None else list(conflict.conditions),
+        "misses": [] if conflict is None else list(conflict.misses),
+        "designs_computed": found.tried,
+        "file": None if path is None else str(path),
+    }
