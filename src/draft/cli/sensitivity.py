@@ -11,12 +11,15 @@ import tyro
 from rich.table import Table
 from rich.text import Text
 
+from draft.cli import explore_options as x
 from draft.cli.display.verdict import console, verdict
 from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
+from draft.errors import DraftError
 from draft.metrics import find
 from draft.values import brief
 
 if TYPE_CHECKING:
+    from draft.design import Design
     from draft.explore.sensitivity import Sensitivity
 
 # Metrics that are printed unless some are named; the JSON has all.
@@ -44,12 +47,25 @@ def main(
             help_behavior_hint="(default: all that the design states as numbers)",
         ),
     ] = (),
+    vary: x.Vary = (),
+    screen: Annotated[
+        Path | None,
+        tyro.conf.arg(
+            metavar="FILE.parquet",
+            help="Take the ranges of --vary from a file of 'draft screen'.",
+            help_behavior_hint="(default: those of --vary)",
+        ),
+    ] = None,
+    n: Annotated[
+        int,
+        tyro.conf.arg(
+            metavar="N", help="Samples of --vary: N (ranges + 2) designs, N a power of two."
+        ),
+    ] = 1024,
     design: DesignName = None,
     values: Values = (),
     payload: Payload = None,
-    seed: Annotated[
-        int, tyro.conf.arg(metavar="N", help="Seed of the samples of the laws' errors.")
-    ] = 0,
+    seed: Annotated[int, tyro.conf.arg(metavar="N", help="Seed of the samples.")] = 0,
     figure: Annotated[
         Path | None,
         tyro.conf.arg(
@@ -60,10 +76,18 @@ def main(
     ] = None,
     json: JsonOutput = False,
 ) -> int:
-    """Show what a change of each number of a design does to its metrics, and how sure that is."""
+    """Show what a change of each number of a design does to its metrics, and how sure that is.
+
+    With --vary it is over ranges: Sobol indices, the shares of the variance of each metric that a
+    number explains alone, and that it has a part in (extra explore).
+    """
     from draft.explore.sensitivity import sensitivity
 
     resolved, _ = open_design(reference, design, values, payload)
+    if vary or screen is not None:
+        if by:
+            raise DraftError("--by names single numbers, and --vary ranges", "omit one of them")
+        return _over_ranges(resolved, vary, screen, of, n, seed, figure, json)
     found = sensitivity(resolved, of or (() if json else USUAL), by, seed=seed)
     if figure is not None:
         from draft.explore.sensitivity_figure import save
@@ -73,6 +97,56 @@ def main(
         print(jsons.dumps(found.record(), indent=2, allow_nan=False))
         return 0
     _print(found)
+    if figure is not None:
+        print(figure)
+    return 0
+
+
+def _over_ranges(
+    design: Design,
+    vary: tuple[str, ...],
+    screen: Path | None,
+    of: tuple[str, ...],
+    n: int,
+    seed: int,
+    figure: Path | None,
+    json: bool,
+) -> int:
+    """Print Sobol indices."""
+    from draft.explore.indices import ranges_of_screen, sobol_indices
+
+    if vary and screen is not None:
+        raise DraftError("both --vary and --screen give ranges", "omit one of them")
+    chosen = vary if screen is None else ranges_of_screen(screen)
+    found = sobol_indices(design, chosen, of or (() if json else USUAL), n=n, seed=seed)
+    if figure is not None:
+        from draft.explore.sensitivity_figure import save_indices
+
+        save_indices(found, figure)
+    if json:
+        print(jsons.dumps(found.record(), indent=2, allow_nan=False))
+        return 0
+    out = console()
+    title = f"shares of the variance, alone / with others, over {found.designs:,} designs"
+    table = Table(box=None, pad_edge=False, title=title, title_justify="left", title_style="dim")
+    table.add_column("number", style="bold", no_wrap=True)
+    table.add_column("range", no_wrap=True)
+    for k, name in enumerate(found.metrics):
+        metric = find(name)
+        unit = "" if metric.unit == "1" else f" {metric.unit}"
+        ends = f"{brief(found.mean[k])} ± {brief(found.deviation[k])}{unit}"
+        table.add_column(f"{name}\n{ends}", justify="right")
+    for i, name in enumerate(found.names):
+        cells = (
+            "-"
+            if math.isnan(found.first[i, k])
+            else f"{found.first[i, k]:.2f} / {found.total[i, k]:.2f} ±{found.total_width[i, k]:.2f}"
+            for k in range(len(found.metrics))
+        )
+        table.add_row(_short(name), found.ranges[i], *cells)
+    out.print(table)
+    for text in found.warnings():
+        out.print(text, style="yellow", markup=False)
     if figure is not None:
         print(figure)
     return 0
@@ -131,11 +205,11 @@ def _cell(found: Sensitivity, i: int, k: int) -> str:
     return text if math.isnan(percent) else f"{text}\n{100 * percent:+.2g} %"
 
 
-def signed(x: float) -> str:
+def signed(change: float) -> str:
     """Text of a change, with its sign."""
-    if math.isnan(x):
+    if math.isnan(change):
         return "-"
-    return f"{'+' if x > 0 else ''}{brief(x)}" if x else "0"
+    return f"{'+' if change > 0 else ''}{brief(change)}" if change else "0"
 
 
 def _short(name: str) -> str:

@@ -145,7 +145,7 @@ def sensitivity(
     """
     if design.count is not None:
         raise DraftError("sensitivities are of one design", "select one, such as `design[0]`")
-    metrics, numbers = _metrics(of), _chosen(design, by)
+    metrics, numbers = closed_metrics(of), _chosen(design, by)
     values = np.array(list(numbers.values()))
     steps = np.array([step_of(design, *one) for one in numbers.items()])
     moves = np.array([PER_CENT * values, -PER_CENT * values, steps, -steps])  # (4, P)
@@ -248,7 +248,12 @@ def _allowed(design: Design, names: Sequence[str], moved: Array) -> NDArray[np.b
     return allowed
 
 
-def _metrics(of: Sequence[str]) -> tuple[str, ...]:
+def closed_metrics(of: Sequence[str]) -> tuple[str, ...]:
+    """Metrics that need no model, all or those that are named.
+
+    Raises:
+        DraftError: one is unknown, or needs a model or a policy.
+    """
     if not of:
         closed = (one for one in METRICS.values() if one.needs == "design")
         return tuple(one.name for one in closed if one.unit != "bool")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from draft import plotting
 from draft.errors import DraftError
+from draft.explore.indices import Indices
 from draft.explore.sensitivity import Sensitivity
 from draft.metrics import find
 from draft.plotting import BLUE, COLUMN, GREY, ORANGE
@@ -57,16 +59,49 @@ def tornado(found: Sensitivity) -> Figure:
     return figure
 
 
+def shares(found: Indices) -> Figure:
+    """Draw the shares of each metric's variance that numbers explain alone, and with others."""
+    from matplotlib.figure import Figure
+
+    rows = len(found.metrics)
+    figure = Figure(figsize=(1.4 * COLUMN, rows * (0.5 + 0.2 * len(found.names))))
+    place = np.arange(len(found.names))[::-1]
+    for k, (axes, name) in enumerate(
+        zip(figure.subplots(rows, 1, squeeze=False).ravel(), found.metrics, strict=True)
+    ):
+        for values, width, shift, color, label in (
+            (found.first, found.first_width, 0.18, BLUE, "alone"),
+            (found.total, found.total_width, -0.18, ORANGE, "with others"),
+        ):
+            bars = np.nan_to_num(values[:, k])
+            errors = np.nan_to_num(width[:, k])
+            axes.barh(place + shift, bars, 0.34, xerr=errors, color=color, label=label)
+        axes.set_yticks(place, [own.removeprefix("actuators.") for own in found.names])
+        axes.set_xlim(0, 1)
+        axes.set_xlabel(f"share of the variance of {name}")
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+    return figure
+
+
+def save_indices(found: Indices, file: Path) -> None:
+    """Write the figure of indices; errors as `save`."""
+    _save(lambda: shares(found), file)
+
+
 def save(found: Sensitivity, file: Path) -> None:
     """Write the figure.
 
     Raises:
         DraftError: the file's name has another ending, or it cannot be written.
     """
+    _save(lambda: tornado(found), file)
+
+
+def _save(make: Callable[[], Figure], file: Path) -> None:
     if file.suffix not in FORMATS:
         cause = f"{file} is no picture that can be written"
         raise DraftError(cause, f"end its name with {', '.join(FORMATS)}")
-    plotting.save(file.parent, {file.stem: lambda: tornado(found)}, kinds=(file.suffix[1:],))
+    plotting.save(file.parent, {file.stem: make}, kinds=(file.suffix[1:],))
 
 
 def _label(found: Sensitivity, i: int) -> str:
