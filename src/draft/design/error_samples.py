@@ -10,6 +10,8 @@ difference.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
+from statistics import NormalDist
 
 import numpy as np
 
@@ -46,21 +48,34 @@ def sample_errors(design: Design, count: int, seed: int = 0, *others: Design) ->
         sigma = np.array(width) / quantile(_SHARE)
         table = actuator.laws.correlation
         alike = [[table.get((a, b), float(a == b)) for b in laws] for a in laws]
-        drawn = rng.standard_normal((count, len(laws))) @ _root(np.array(alike)).T * sigma
+        drawn = _normal(rng, count, len(laws)) @ _root(np.array(alike)).T * sigma
         actuators[name] = {
             law: _downwards(drawn[:, k], sigma[k], small_sigma_of(actuator, law))
             for k, law in enumerate(laws)
         }
     trends = (segment.trend for one in designs for segment in one.segments)
     segments = {
-        kind: rng.standard_normal(count) * population.segments[kind].sigma
+        kind: _normal(rng, count)[:, 0] * population.segments[kind].sigma
         for kind in dict.fromkeys(trends)
         if kind is not None
     }
     trunk: Value = 0.0
     if not all(one.trunk.density_stated for one in designs):
-        trunk = rng.standard_normal(count) * population.trunk_law.sigma
+        trunk = _normal(rng, count)[:, 0] * population.trunk_law.sigma
     return LawErrors(actuators, segments, trunk)
+
+
+def _normal(rng: np.random.Generator, count: int, sources: int = 1) -> Array:
+    """Standard normal samples, shape (count, sources): a Latin hypercube, so that few suffice."""
+    even = _even(count)
+    return np.stack([even[rng.permutation(count)] for _ in range(sources)], axis=1)
+
+
+@lru_cache(maxsize=8)
+def _even(count: int) -> Array:
+    """Middles of equal shares of the normal distribution."""
+    normal = NormalDist()
+    return np.array([normal.inv_cdf((i + 0.5) / count) for i in range(count)])
 
 
 def _root(correlation: Array) -> Array:

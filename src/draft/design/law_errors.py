@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from draft.values import Array, Value
 
@@ -36,6 +37,10 @@ class LawErrors:
     def repeated(self, times: int) -> LawErrors:
         """The errors `times` times, one after another, of N designs each."""
         return self._each(lambda x: np.tile(x, times))
+
+    def of(self, rows: NDArray[np.intp]) -> LawErrors:
+        """The errors of some of N designs, or of one several times."""
+        return self._each(lambda x: x[rows])
 
     def after(self, count: int) -> LawErrors:
         """The errors after those of `count` designs whose laws do not err."""

@@ -1,13 +1,14 @@
 """Conditions on designs.
 
 A condition is an expression, in the language of specs, of parameters, values of actuator classes
-(`leg.mass`), metrics and `accepted`.
+(`leg.mass`), metrics and `accepted`, and of quantiles of such over the errors of the laws
+(`q10(jump_height)`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,8 +17,9 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, suggest
+from draft.explore.quantiles import Quantile, names, split
 from draft.laws.quantities import QUANTITIES
-from draft.metrics import LEARNED, METRICS, find
+from draft.metrics import LEARNED, METRICS, find, of_design
 from draft.metrics.learned import PREFIX
 from draft.metrics.registry import RENAMED, unknown
 from draft.spec import Spec
@@ -34,10 +36,12 @@ class Condition:
     Attributes:
         expression: the parsed expression.
         metrics: names of the metrics in it.
+        quantiles: quantiles in it, which it reads by their names.
     """
 
     expression: Expression
     metrics: tuple[str, ...]
+    quantiles: tuple[Quantile, ...] = ()
 
     @property
     def needs_model(self) -> bool:
@@ -54,7 +58,9 @@ class Condition:
         Raises:
             ResolveError: it is undefined for every design.
         """
-        env = {name: _read(design, name, metrics) for name in self.expression.names}
+        own = names(self.quantiles)
+        env = {name: _read(design, name, metrics) for name in self.expression.names - own}
+        env |= {one.name: one.of(design) for one in self.quantiles}
         return self.expression.value(env, "`where`")
 
     def holds(self, design: Design, metrics: Mapping[str, Value]) -> NDArray[np.bool_]:
@@ -78,14 +84,24 @@ def condition(spec: Spec, text: str, option: str = "`where`") -> Condition:
     if not text.strip():
         remedy = 'give a condition such as "accepted and leg.mass < 1"'
         raise DraftError(f"{option} is empty", remedy)
-    expression = parse(text, start)
-    for name in sorted(expression.names):
+
+    def inside(part: str, place: int) -> Callable[[Design], Value]:
+        own = condition(spec, part, option)
+        if own.needs_model:
+            cause = f"a quantile of '{part.strip()}' would need models or roll-outs"
+            remedy = "use closed-form metrics in it"
+            raise DraftError(Problem(cause, Location(option, 1, place + 1), remedy))
+        return lambda design: own.value(design, of_design(design, own.metrics))
+
+    outer, quantiles = split(text, inside, start)
+    expression = parse(outer, start)
+    for name in sorted(expression.names - names(quantiles)):
         found = re.search(rf"(?<![\w.]){re.escape(name)}(?!\w)", text)
         column = found.start() + 1 if found else 1
         problem = _problem(spec, name, Location(option, 1, column))
         if problem is not None:
             raise DraftError(problem)
-    return Condition(expression, tuple(sorted(_metrics(spec, expression))))
+    return Condition(expression, tuple(sorted(_metrics(spec, expression))), quantiles)
 
 
 def _metrics(spec: Spec, expression: Expression) -> set[str]:
