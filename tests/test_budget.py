@@ -29,7 +29,7 @@ BUDGET = {
     "reporting": 1_780,
     "serving": 550,
     "spec": 4_530,
-    "studio": 2_720,
+    "studio": 3_000,
     "study": 6_470,
     "twins": 1_590,
     "validation": 980,

@@ -429,3 +429,32 @@ def test_most_of_the_window_shows_the_robot_and_a_click_tells_of_a_link(
     assert "Link" in tab.inner_text("#ds-link")
     assert "kg" in tab.inner_text("body")
     picture(tab, "link")
+
+
+def choose(tab: Any, label: str, name: str) -> None:
+    chromium.field(tab, label).click()
+    tab.get_by_role("option", name=name, exact=True).click()
+
+
+def test_sliders_show_their_effect_a_held_metric_stays_and_a_target_is_reached(
+    tab: Any, studio: Studio
+) -> None:
+    before = mass(tab)
+    tab.get_by_text("levers", exact=True).click()
+    choose(tab, "effect on", "jump_height")
+    until(lambda: tab.locator("label:has-text('no_load_speed [rad/s] ▲')").count() == 1)
+    choose(tab, "hold", "mass")
+    choose(tab, "by", "trunk_length")
+    until(lambda: tab.locator("#ds-levers").count() == 0)
+    push(tab, "thigh_length", 5)
+    until(lambda: "holds mass" in tab.inner_text("#ds-levers"))
+    assert mass(tab) == before
+    picture(tab, "held")
+    enter(tab, studio, "target", "0.4")
+    press(tab, "Reach")
+    until(lambda: "reached by" in tab.inner_text("#ds-levers"))
+    until(lambda: tab.locator("label:has-text('● no_load_speed')").count() == 1)
+    picture(tab, "reached")
+    press(tab, "Undo")
+    until(lambda: tab.locator("label:has-text('● no_load_speed')").count() == 0)
+    assert tab.locator("label:has-text('● thigh_length')").count() == 1

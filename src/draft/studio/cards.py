@@ -191,9 +191,10 @@ def derived(session: Session) -> str:
     return card(f"<table>{''.join(rows)}</table>")
 
 
-def plain(text: str) -> str:
-    """A card of plain text; empty text gives none."""
-    return card(f'<div class="mute">{_lines(text)}</div>') if text else ""
+def plain(text: str, name: str = "") -> str:
+    """A card of plain text, with a name in the page; empty text gives none."""
+    named = f' id="{name}"' if name else ""
+    return card(f'<div class="mute"{named}>{_lines(text)}</div>') if text else ""
 
 
 def link(path: str, text: str) -> str:

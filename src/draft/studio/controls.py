@@ -10,6 +10,7 @@ import viser
 
 from draft.studio import fields
 from draft.studio.fields import NO_PART, Slider
+from draft.studio.levers import Levers
 from draft.studio.library import Setting
 from draft.studio.session import Session
 from draft.studio.tasks import TaskThread
@@ -35,8 +36,11 @@ class Controls:
         tab: context in which folders of actuator classes are added.
     """
 
-    def __init__(self, gui: viser.GuiApi, session: Session, tasks: TaskThread) -> None:
-        self._gui, self._session, self._tasks = gui, session, tasks
+    def __init__(
+        self, gui: viser.GuiApi, session: Session, tasks: TaskThread, levers: Levers
+    ) -> None:
+        self._gui, self._session, self._tasks, self._levers = gui, session, tasks, levers
+        self._effects: dict[str, str] = {}
         self.tab: AbstractContextManager[object] = nullcontext()
         self._controls: dict[str, Control] = {}
         self._values: dict[str, Setting] = {}
@@ -88,6 +92,7 @@ class Controls:
     def refresh(self) -> None:
         """Update values, marks and resets from the session."""
         changed = self._session.changed()
+        self._effects = self._levers.effects(self._session.design)
         for name, control in self._controls.items():
             marked = name in changed
             self._mark(control, marked, changed.get(name))
@@ -112,7 +117,8 @@ class Controls:
         handle.value = number
 
     def _mark(self, control: Control, marked: bool, before: Setting) -> None:
-        label = (MARK if marked else "") + _label(control.slider)
+        effect = self._effects.get(control.slider.name, "")
+        label = (MARK if marked else "") + _label(control.slider) + (f"  {effect}" * bool(effect))
         if control.handle.label != label:
             control.handle.label = label
         if control.reset.visible != marked:
@@ -157,7 +163,11 @@ class Controls:
 
         def apply() -> None:
             self._values[name] = now = read()
-            self._session.set(name, now)
+            if isinstance(now, float):
+                moved = self._levers.moved(self._session.design, name, now)
+                self._session.set_all(moved, name)
+            else:
+                self._session.set(name, now)
 
         async def moved(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:

@@ -17,6 +17,8 @@ from draft.studio import cards, fields, live_cards, trend_cards
 from draft.studio.bindings import Element, on, on_key
 from draft.studio.controls import Controls
 from draft.studio.drop import Drop
+from draft.studio.levers import Levers
+from draft.studio.levers_folder import LeversFolder
 from draft.studio.library import DEFAULT
 from draft.studio.scene3d import RobotMesh, surroundings
 from draft.studio.session import Session
@@ -68,7 +70,8 @@ class Panel:
         self._html: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]] = []
         self._joints: dict[str, viser.GuiSliderHandle] = {}
         self._tasks = TaskThread(self.refresh, self._simulate)
-        self._controls = Controls(client.gui, session, self._tasks)
+        self._levers = Levers()
+        self._controls = Controls(client.gui, session, self._tasks, self._levers)
         self._walking = WalkControls(client.gui, self._walker, self._tasks, self._set_walking)
         self._robot = RobotMesh(client.scene, "/robot")
         self._ghost = RobotMesh(client.scene, "/pinned", ghost=True)
@@ -153,6 +156,8 @@ class Panel:
         tabs = gui.add_tab_group()
         self._controls.tab = tabs.add_tab("Parameters")
         with self._controls.tab:
+            pull = LeversFolder(gui, self._session, self._tasks, self._levers)
+            self._show(pull.told)
             self._controls.add_parameters()
             with gui.add_folder("derived", order=_LAST, expand_by_default=False):
                 self._show(lambda: cards.derived(self._session))

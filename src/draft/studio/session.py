@@ -105,21 +105,29 @@ class Session:
         Returns:
             Whether it succeeded; if not, `message` says why and the state is unchanged.
         """
-        values = dict(self.point.values)
-        values[name] = value
-        if name in fields.names(self.library.spec) and _same(
-            value, self.value(name, self.origin.design)
-        ):
-            del values[name]
+        return self.set_all({name: value}, name)
+
+    def set_all(self, changes: Mapping[str, Setting], gesture: str) -> bool:
+        """Change several fields at once, as `set`.
+
+        Args:
+            changes: values by name.
+            gesture: changes of one gesture within a second of each other are one step of undo.
+        """
+        values = {**self.point.values, **changes}
+        known = fields.names(self.library.spec)
+        for name, value in changes.items():
+            if name in known and _same(value, self.value(name, self.origin.design)):
+                del values[name]
         if values == self.point.values:
             self.message = ""
             return True
         last, when = self._last
         now = self._clock()
-        continues = last == name and now - when < GESTURE
+        continues = last == gesture and now - when < GESTURE
         done = self._move_to(replace(self.point, values=values), remember=not continues)
         if done:
-            self._last = (name, now)
+            self._last = (gesture, now)
         return done
 
     def set_text(self, name: str, text: str) -> bool:

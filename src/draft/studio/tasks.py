@@ -42,6 +42,10 @@ class TaskThread:
         """Tell whether a task of this key waits."""
         return key in self._waiting
 
+    def shows(self) -> None:
+        """Show the state between two steps of a task."""
+        self._after()
+
     def close(self) -> None:
         """End the thread after its current task."""
         with self._condition:
