@@ -29,7 +29,7 @@ BUDGET = {
     "reporting": 1_780,
     "serving": 550,
     "spec": 4_530,
-    "studio": 3_000,
+    "studio": 3_030,
     "study": 6_470,
     "twins": 1_590,
     "validation": 980,
