@@ -91,8 +91,8 @@ def main(
 
 
 def _caused(found: RealRobot, policy: str | None) -> dict[str, dict[str, float]]:
-    """Causes of the differences between both columns, if a policy drives the robot."""
-    if not found.policy:
+    """Causes of the differences between both columns, of robots with published figures."""
+    if not found.policy or not found.verdicts:
         return {}
     return causes(found.twin, open_source(policy, blind=True), *setting("auto", "auto"))
 
