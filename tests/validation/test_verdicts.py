@@ -39,11 +39,19 @@ def test_a_speed_below_that_of_walking_is_a_claim_on_a_product() -> None:
 
 
 @pytest.mark.parametrize(
-    ("watts", "word"), [(299, "outside"), (301, "within"), (674, "within"), (676, "outside")]
+    ("watts", "word"), [(43, "outside"), (44, "within"), (97, "within"), (98, "outside")]
 )
 def test_energy_is_right_within_a_factor(watts: float, word: str) -> None:
-    # B2: 2250 Wh over 5 h of walking.
-    assert walking_power("unitree_b2") is not None
+    # CyberDog 2: 97.2 Wh over 1.5 h.
+    assert judged("xiaomi_cyberdog2", walking_power=watts)["walking_power"] == word
+
+
+@pytest.mark.parametrize(("watts", "word"), [(100, "within"), (674, "within"), (676, "outside")])
+def test_a_time_of_at_least_so_long_is_a_power_of_at_most_so_much(watts: float, word: str) -> None:
+    # B2: 2250 Wh over more than 5 h of walking.
+    found = walking_power("unitree_b2")
+    assert found is not None
+    assert (found[0].bound, found[1]) == ("most", 450.0)
     assert judged("unitree_b2", walking_power=watts)["walking_power"] == word
 
 

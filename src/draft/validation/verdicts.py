@@ -9,7 +9,7 @@ without a definition is not judged.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from draft.design.legs import GRAVITY
@@ -17,6 +17,7 @@ from draft.validation.capabilities import Estimate
 from draft.validation.published import Figure, best, of_robot
 
 ENERGY = 1.5
+_OTHER_WAY: dict[str, Literal["least", "most", ""]] = {"least": "most", "most": "least", "": ""}
 LIMITS = {
     "top_speed": ("top_speed",),
     "step_up": ("step", "stairs"),
@@ -93,4 +94,6 @@ def walking_power(key: str) -> tuple[Figure, float] | None:
     if not batteries or not times:
         return None
     figure = (walking or list(times))[0]
+    # A longer time is less power.
+    figure = replace(figure, bound=_OTHER_WAY[figure.bound])
     return figure, batteries[0].high / math.sqrt(figure.low * figure.high)

@@ -245,7 +245,8 @@ def test_an_exported_policy_gives_the_surface_of_its_run(run: Run, found: Surfac
 
 def test_an_exported_policy_is_measured_with_its_own_physics_and_servos() -> None:
     shipped = open_policy(FAMILY)
-    assert _of_file(shipped, "shipped").plan.config == LAPTOP.config
+    own = {"episodes.contact_time": (0.01, 0.01), "episodes.delay": (0.0, 0.015)}
+    assert _of_file(shipped, "shipped").plan.config == LAPTOP.config.with_values(own)
     other = replace(shipped, timestep=0.001, action_scale=2 * shipped.action_scale)
     config = _of_file(other, "other").plan.config
     assert (config.physics.timestep, config.physics.decimation) == (0.001, 20)

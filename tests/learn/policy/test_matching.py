@@ -307,14 +307,14 @@ def test_an_import_walks_at_half_the_froude_speed(go2: Path) -> None:
     model = preview(open_design(go2))
     found = fit(model, "run")
     assert found.policy.joints[:3] == ("FL_hip_joint", "FL_thigh_joint", "FL_calf_joint")
-    assert "stance length 0.383 m" in found.warning
+    assert found.warning == ""
     scale = float(np.sqrt(9.81 * legged_robot(model.design, model).leg_length))
     walk = Walk(model, found, (0.5 * scale, 0.0, 0.0))
     walk.advance(3.0)
     start = walk.data.qpos[0]
     walk.advance(5.0)
     assert walk.falls == 0
-    assert (walk.data.qpos[0] - start) / 5.0 == pytest.approx(0.38 * scale, rel=0.15)
+    assert (walk.data.qpos[0] - start) / 5.0 == pytest.approx(0.42 * scale, rel=0.15)
 
 
 def test_a_robot_without_a_home_pose_walks_from_the_crouch(tmp_path: Path, shipped: Path) -> None:
@@ -338,7 +338,7 @@ def test_the_studio_and_a_report_let_an_import_walk(go2: Path) -> None:
     assert {load.joint for load in walker.loads()} == set(model.design.joints)
     gait = record(model, seconds=3.0)
     assert gait.walks
-    assert "outside the region of the policy of the family of quadrupeds" in gait.note
+    assert gait.note == ""
 
 
 def needs_mjlab(test: Any) -> Any:
@@ -364,9 +364,9 @@ def test_other_names_signs_and_order_walk_as_fast_in_mjlab(tmp_path: Path, shipp
 
 
 @needs_mjlab
-def test_an_import_has_learned_metrics_that_say_that_it_is_outside(go2: Path) -> None:
-    design = open_design(go2)
+def test_a_loaded_import_has_learned_metrics_that_say_that_it_is_outside(go2: Path) -> None:
+    design = open_design(go2).spec.resolve({"payload": 25.0})
     found = of_policy(design, replicas=1, seconds=3.0, outside=True)
     assert found["learned.inside"] == 0
-    assert float(found["learned.top_speed"]) > 1.5
+    assert float(found["learned.top_speed"]) > 1.0
     assert np.isnan(float(of_policy(design, replicas=1, seconds=1.0)["learned.top_speed"]))

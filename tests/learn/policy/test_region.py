@@ -108,8 +108,7 @@ def test_somewhat_more_friction_is_inside() -> None:
 
 
 def test_a_load_that_no_policy_knew_is_outside() -> None:
-    found = fitted({"payload": 40.0}, "climb")  # A skill that the family has not learnt.
-    assert found.region.name == "quadruped:cheetah"
+    found = fitted({"payload": 120.0}, "climb")
     assert not found.inside
     assert any(gap.name == "mass" and gap.unit == "kg" for gap in found.outside)
 
