@@ -58,7 +58,8 @@ def test_a_solution_meets_all_and_no_plain_search_finds_a_nearer_one(
     drawn = np.clip(start + share * (high - low), low, high)
     many = QUADRUPED.resolve("cheetah", {name: drawn[:, i] for i, name in enumerate(VARY)})
     table = of_design(many, own)
-    met = many.accepted & (table["mass"] <= limits[0]) & (table["payload_rated"] >= limits[1])
+    met = np.asarray(many.accepted) & (table["mass"] <= limits[0])
+    met &= table["payload_rated"] >= limits[1]
     met &= table["jump_height"] >= limits[2]
     change = np.sqrt((((drawn - start) / (high - low)) ** 2).mean(axis=1))
     if found.conflict is not None:

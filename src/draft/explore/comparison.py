@@ -165,8 +165,7 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
                 if setting is not _MISSING:
                     given[names[i]] = setting
             for i in numeric:
-                ends = float(before[names[i]]), float(after[names[i]])
-                given[names[i]] = np.where(chosen[rows, i], ends[1], ends[0])
+                given[names[i]] = np.where(chosen[rows, i], after[names[i]], before[names[i]])
             row = of_design(spec.resolve(given), metrics)
             for k, name in enumerate(metrics):
                 found[rows, k] = row[name]
@@ -177,10 +176,10 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
         shares = _shapley(len(names), measured, seed, exact)
         better = _better(a, b, metrics, seed, samples)
     texts = [tuple(_text(of[name]) for name in names) for of in (before, after)]
-    return Part(names, *texts, shares, better, exact)
+    return Part(names, texts[0], texts[1], shares, better, exact)
 
 
-def _differing(a: Design, b: Design) -> tuple[dict[str, object], dict[str, object]]:
+def _differing(a: Design, b: Design) -> tuple[dict[str, Any], dict[str, Any]]:
     """Settings that differ, in both designs."""
     # A design without a payload has one of zero.
     if any(one.spec.payload is not None for one in (a, b)):
@@ -202,7 +201,7 @@ def _loaded(design: Design) -> Design:
     return design.spec.resolve({**design.values, MASS: 0.0})
 
 
-def _plain(setting: object) -> object:
+def _plain(setting: Any) -> Any:
     return float(setting) if _real(setting) else setting
 
 

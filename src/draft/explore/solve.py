@@ -334,7 +334,7 @@ class _Search:
         return best
 
     def _resolved(self, best: Array) -> Design:
-        own = {name: float(x[0]) for name, x in self._values(best[None]).items()}
+        own = {name: float(np.asarray(x)[0]) for name, x in self._values(best[None]).items()}
         moved = {
             axis.name: own[axis.name] for axis, x in zip(self._axes, best, strict=True) if x != 0
         }
