@@ -1,6 +1,6 @@
 """Levers of one tab: what each slider does to a metric, a metric that is held, and one to reach.
 
-All of it is without the browser; `levers_panel` shows it.
+All of it is without the browser; `levers_tab` shows it.
 """
 
 from __future__ import annotations

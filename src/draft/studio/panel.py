@@ -18,7 +18,7 @@ from draft.studio.bindings import Element, on, on_key
 from draft.studio.controls import Controls
 from draft.studio.drop import Drop
 from draft.studio.levers import Levers
-from draft.studio.levers_folder import LeversFolder
+from draft.studio.levers_tab import LeversTab
 from draft.studio.library import DEFAULT
 from draft.studio.scene3d import RobotMesh, surroundings
 from draft.studio.session import Session
@@ -71,6 +71,7 @@ class Panel:
         self._joints: dict[str, viser.GuiSliderHandle] = {}
         self._tasks = TaskThread(self.refresh, self._simulate)
         self._levers = Levers()
+        self._pull: LeversTab | None = None
         self._controls = Controls(client.gui, session, self._tasks, self._levers)
         self._walking = WalkControls(client.gui, self._walker, self._tasks, self._set_walking)
         self._robot = RobotMesh(client.scene, "/robot")
@@ -153,16 +154,17 @@ class Panel:
 
         self._show(lambda: cards.STYLE + cards.head(self._session))
         self._build_head()
+        self._show(self._levers_card)
         tabs = gui.add_tab_group()
         self._controls.tab = tabs.add_tab("Parameters")
         with self._controls.tab:
-            pull = LeversFolder(gui, self._session, self._tasks, self._levers)
-            self._show(pull.told)
             self._controls.add_parameters()
             with gui.add_folder("derived", order=_LAST, expand_by_default=False):
                 self._show(lambda: cards.derived(self._session))
                 self._controls.add_derived_resets()
         self._controls.update_actuators()
+        with tabs.add_tab("Levers"):
+            self._pull = LeversTab(gui, self._session, self._tasks, self._levers)
         with tabs.add_tab("Pose"):
             self._build_poses()
         with tabs.add_tab("Expression"):
@@ -188,6 +190,9 @@ class Panel:
         with panel.add_tab("Trends"):
             self._show(lambda: trend_cards.trends(session))
         panel.dock_below(self._client.gui.main_panel)
+
+    def _levers_card(self) -> str:
+        return "" if self._pull is None else self._pull.told()
 
     def _build_walk(self) -> None:
         self._walking.add_switch()

@@ -1,4 +1,4 @@
-"""Folder of the levers: the metric whose effects sliders show, one that is held, one to reach."""
+"""Tab of the levers: the metric whose effects sliders show, one that is held, one to reach."""
 
 from __future__ import annotations
 
@@ -19,31 +19,28 @@ _FRAMES, _PAUSE = 12, 0.04  # Of the way to a solution [s].
 _REACH = "reach"  # Gesture of it: one step of undo.
 
 
-class LeversFolder:
-    """The folder's elements, and what they do."""
+class LeversTab:
+    """The tab's elements, and what they do."""
 
     def __init__(
         self, gui: viser.GuiApi, session: Session, tasks: TaskThread, levers: Levers
     ) -> None:
-        """Add the folder, collapsed."""
+        """Add the elements."""
         self._session, self._tasks, self._levers = session, tasks, levers
         self._message = ""
         names = [NOTHING, *metrics()]
         numbers = [NOTHING, *stated_numbers(session.design)]
-        with gui.add_folder("levers", expand_by_default=False):
-            self._metric = gui.add_dropdown(
-                "effect on", names, hint="Sliders show what a step of each does to this metric."
-            )
-            self._held = gui.add_dropdown(
-                "hold", names, hint="This metric stays while sliders move."
-            )
-            self._follower = gui.add_dropdown(
-                "by", numbers, hint="The number that follows, so that the metric stays."
-            )
-            self._target = gui.add_text(
-                "target", "", hint='A number for the metric of "effect on", such as 0.5 or <= 30.'
-            )
-            button = gui.add_button("Reach", hint="Go to the nearest design that meets the target.")
+        self._metric = gui.add_dropdown(
+            "effect on", names, hint="Sliders show what a step of each does to this metric."
+        )
+        self._held = gui.add_dropdown("hold", names, hint="This metric stays while sliders move.")
+        self._follower = gui.add_dropdown(
+            "by", numbers, hint="The number that follows, so that the metric stays."
+        )
+        self._target = gui.add_text(
+            "target", "", hint='A number for the metric of "effect on", such as 0.5 or <= 30.'
+        )
+        button = gui.add_button("Reach", hint="Go to the nearest design that meets the target.")
         for handle in (self._metric, self._held, self._follower):
             handle.on_update(self._chosen)
         button.on_click(self._asked)
