@@ -26,7 +26,7 @@ from draft.files import write
 from draft.learn.measuring.bands import FILE as BANDS
 from draft.learn.measuring.evaluation import setting
 from draft.learn.measuring.policies import open_source
-from draft.plotting import make_folder
+from draft.plotting import decorate, make_folder
 from draft.validation.causes import JUDGED as CAUSED
 from draft.validation.causes import causes
 from draft.validation.compare import RealRobot, real_robot
@@ -163,13 +163,8 @@ def speeds(found: Sequence[dict[str, Any]]) -> None:
             fontsize=8,
             color=color,
         )
-    axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
-    ticks = [1, 2, 3, 4, 5, 6, 8]
-    axes.set_xticks(ticks, map(str, ticks))
-    axes.set_yticks(ticks, map(str, ticks))
-    axes.minorticks_off()
-    axes.set_xlabel("published top speed [m/s]")
-    axes.set_ylabel("predicted top speed [m/s]")
+    axes.set(xlim=ends, ylim=ends)
+    decorate(axes, "published top speed [m/s]", "predicted top speed [m/s]")
     axes.legend(loc="lower right", frameon=False)
     make_folder(IMAGES)
     figure.savefig(IMAGES / "speeds.png", dpi=120)

@@ -141,10 +141,14 @@ def test_a_shipped_policy_is_filmed() -> None:
 
 def test_an_import_is_filmed_and_what_lies_outside_is_said(tmp_path: Path) -> None:
     draft.import_robot(GO2, out=tmp_path / "dog")
-    done = filmed(str(tmp_path / "dog"), "--seconds", "0.4")
+    design = tmp_path / "dog/designs/loaded.yaml"
+    design.parent.mkdir(exist_ok=True)
+    design.write_text("doc: With a load.\nvalues: {payload: 40}\n", encoding="utf-8")
+    done = filmed(f"{tmp_path / 'dog'}:loaded", "--seconds", "0.4")
     assert "warning: outside the region of the policy of the family of quadrupeds" in done.stderr
-    assert "dog, walk: 0.4 s at (0.47, 0.00) m/s" in done.stdout
-    assert Path("dog-walk.mp4").stat().st_size > 1000
+    assert "walk: 0.4 s at (0.47, 0.00) m/s" in done.stdout
+    (video,) = Path().glob("*-walk.mp4")
+    assert video.stat().st_size > 1000
 
 
 @pytest.mark.usefixtures("run")

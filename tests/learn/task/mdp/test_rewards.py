@@ -333,10 +333,10 @@ def test_power_is_that_of_motors_and_heat_per_weight_and_command(flat: Any) -> N
     torque, speed = flat.sim.data.qfrc_actuator[:, 6:], flat.sim.data.qvel[:, 6:]
     assert (torque * speed < 0).any()  # Some brake, and return nothing.
     robots = flat.scene["robot"].cfg.members
-    loss = torch.stack(
-        [torch.tensor(m.no_load_speed) / torch.tensor(m.peak_torque) for m in robots]
-    )
-    heat = torque.square() * 0.453125 * loss[flat.scene["robot"].member]
+    # The cheetah's module at its rated torque: a cylinder of 63 mm by 46 mm, 900 W/m2.
+    assert robots[0].motor_heat[0] == pytest.approx(900 * 0.043146 / 24.777**2, rel=1e-3)
+    loss = torch.tensor([m.motor_heat for m in robots])
+    heat = torque.square() * loss[flat.scene["robot"].member]
     watts = ((torque * speed).clamp(min=0.0) + heat).sum(1)
     weight = each(flat, [9.81 * m.mass for m in robots])
     for asked, counted in ((2.0, torch.tensor(2.0)), (0.0, 0.5 * roots(flat))):
