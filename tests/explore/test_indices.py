@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("SALib")
+pytest.importorskip("pyarrow")
+pytest.importorskip("matplotlib")
 
 import draft
 from draft.errors import DraftError

@@ -62,6 +62,8 @@ def test_a_robust_target_asks_for_more_than_the_plain_one() -> None:
 
 
 def test_a_screen_keeps_by_quantiles(command: Command, tmp_path: object) -> None:
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("scipy")
     line = "screen quadruped:bear --n 64 --vary thigh_length=0.3:0.45 --out"
     wide, sure = (f"{tmp_path}/{name}.parquet" for name in ("wide", "sure"))
     kept = [

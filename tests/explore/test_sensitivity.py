@@ -120,6 +120,7 @@ def test_several_designs_are_refused() -> None:
 
 
 def test_the_command_prints_what_matters_and_json_all(command: Command, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
     said = command("sensitivity bear --figure", tmp_path / "bars.png").out
     assert "without effect: trunk_width, crouch" in said
     assert "actuators.leg.peak_torque: 50 N m more, and the filter refuses it" in said

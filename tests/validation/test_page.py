@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
+pytest.importorskip("PIL")
+pytest.importorskip("matplotlib")
+
 from docs import real_robots
 from draft.learn.measuring.bands import FILE
 
