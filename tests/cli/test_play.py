@@ -146,7 +146,7 @@ def test_an_import_is_filmed_and_what_lies_outside_is_said(tmp_path: Path) -> No
     design.write_text("doc: With a load.\nvalues: {payload: 40}\n", encoding="utf-8")
     done = filmed(f"{tmp_path / 'dog'}:loaded", "--seconds", "0.4")
     assert "warning: outside the region of the policy of the family of quadrupeds" in done.stderr
-    assert "walk: 0.4 s at (0.47, 0.00) m/s" in done.stdout
+    assert "loaded, walk: 0.4 s at (0.47, 0.00) m/s" in done.stdout
     (video,) = Path().glob("*-walk.mp4")
     assert video.stat().st_size > 1000
 

@@ -9,7 +9,7 @@ and of the filter are no obstacle. Equal seeds give equal solutions.
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -386,8 +386,3 @@ class _Search:
             if rest and self._nearest(rest)[1].any():
                 left = rest
         return tuple(one.text for one in left)
-
-
-def changes(found: Solution) -> Mapping[str, float]:
-    """Values of a solution that differ from those of its start, to save it as a design."""
-    return {one.name: one.after for one in found.moved}

@@ -55,11 +55,11 @@ def test_a_new_body_keeps_the_state_and_walks_on() -> None:
     np.testing.assert_array_equal(walk.data.qvel, before[1])
     assert walk.data.time == before[2]
     assert walk.fit.region.name == "the family of quadrupeds"
-    walk.command = (1.5, 0.0, 0.0)
+    walk.command = (2.0, 0.0, 0.0)
     walk.advance(2.0)
     start = walk.data.qpos[0]
     walk.advance(4.0)
-    assert (walk.data.qpos[0] - start) / 4.0 == pytest.approx(1.5, rel=0.15)  # as asked
+    assert (walk.data.qpos[0] - start) / 4.0 == pytest.approx(2.0, abs=0.1)  # as asked
     assert walk.falls == 0
 
 
@@ -265,17 +265,19 @@ def test_a_gait_is_repeated_without_a_jump() -> None:
 
 
 def test_a_robot_that_falls_stands_and_the_reason_is_given() -> None:
-    values = {"thigh_length": 0.9, "shank_length": 0.9}
+    weak = {"actuators.leg.peak_torque": 30.0}
+    values = {"thigh_length": 0.9, "shank_length": 0.9, **weak}
     gait = record(body(values))
     assert not gait.walks
     walk = walking(values)
     walk.command = (0.5 * walk.fit.policy.forward, 0.0, 0.0)
     while not walk.falls:
         walk.step()
-    assert walk.data.time > 0.1
+    assert 0.1 < walk.data.time < 1.4  # while it settles, of which nothing is recorded
     assert gait.reason == f"it falls after {walk.data.time:.1f} s"
     assert "leg length 1.8 m (trained at " in gait.note
-    assert gait.remedy == "draft train quadruped --set thigh_length=0.9 shank_length=0.9"
+    words = "thigh_length=0.9 shank_length=0.9 actuators.leg.peak_torque=30.0"
+    assert gait.remedy == f"draft train quadruped --set {words}"
 
 
 def test_a_robot_without_a_policy_stands() -> None:
