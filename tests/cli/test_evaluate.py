@@ -73,7 +73,7 @@ def test_a_design_is_evaluated_with_a_policy(command: Command) -> None:
     summary = json.loads(file.read_text())
     assert (summary["design"], summary["members"]) == ("dog", ["dog"])
     assert summary["scalars"]["walk_survival"] == 1
-    assert any(text.startswith("speed: trained up to 4.2 m/s") for text in summary["flags"])
+    assert any(text.startswith("speed: trained up to 4.19 m/s") for text in summary["flags"])
     assert ": exists; add --again to repeat it" in command(asked).out
     policy = draft.policy("cheetah", "walk").file  # It does not observe its design.
     command(f"{asked} --test walk --policy {policy} --out there")
