@@ -11,8 +11,10 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import yaml
 
 from draft.design import Design
 from draft.errors import DraftError
@@ -21,7 +23,7 @@ from draft.explore.goals import Constraint
 from draft.explore.sensitivity import stated_numbers
 from draft.metrics import of_design
 from draft.spec.expressions import syntax_tree
-from draft.values import Array, Value
+from draft.values import Array, Value, brief
 from draft.variation.axes import Axis, Vary, parse
 
 REACH = 2.0  # A number without a range of its own is varied from its half to its double.
@@ -79,6 +81,33 @@ class Solution:
     moved: tuple[Moved, ...]
     conflict: Conflict | None
     tried: int
+
+    def record(self) -> dict[str, Any]:
+        """Plain data."""
+        conflict = self.conflict
+        return {
+            "met": conflict is None,
+            "change": self.change,
+            "moved": [
+                {"name": one.name, "from": one.before, "to": one.after, "why": list(one.why)}
+                for one in self.moved
+            ],
+            "excluded_together": [] if conflict is None else list(conflict.conditions),
+            "misses": [] if conflict is None else list(conflict.misses),
+            "designs_computed": self.tried,
+        }
+
+    def design_file(self, start: Design, conditions: Sequence[str]) -> str:
+        """Text of the design file: the values, and above them why each number moved."""
+        doc = f"Nearest to {start.reference} with {', '.join(conditions)}."
+        lines = []
+        for one in self.moved:
+            why = f"; else {'; '.join(one.why)}" if one.why else ""
+            lines.append(f"# {one.name}: {brief(one.before)} -> {brief(one.after)}{why}")
+        values = dict(start.values) | {one.name: one.after for one in self.moved}
+        document = {"doc": doc, "values": values}
+        text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=1000)
+        return "\n".join([*lines, text])
 
 
 def solve(
