@@ -107,6 +107,20 @@ def test_robots_are_listed_by_references_that_name_them(here: Path) -> None:
     for reference, row in found.items():
         assert told("check", design=reference)["mass_kg"] == row["mass_kg"]
     assert "." in Folder(here / "monoped").robots()
+    told("new_robot", name="pets/dog", like="quadruped")
+    assert "pets/dog" in told("list_robots")
+
+
+@pytest.mark.usefixtures("here")
+def test_lists_and_objects_may_be_texts_of_json() -> None:
+    values = {"thigh_length": 0.35, "actuators.leg.gear_ratio": None}
+    found = told("check", design="monoped", values=values)
+    assert found == told("check", design="monoped", values=json.dumps(values))
+    names = ["mass", "reach"]
+    found = told("sensitivity", design="bear", metrics=names, by="thigh_length")
+    asked = {"metrics": json.dumps(names), "by": '["thigh_length"]'}
+    assert found == told("sensitivity", design="bear", **asked)
+    assert "no metric '[mass'" in refused("sensitivity", design="bear", metrics="[mass")
 
 
 def test_a_design_is_saved_as_a_named_one_of_its_robot(here: Path) -> None:

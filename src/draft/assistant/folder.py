@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 
 from draft.design import Design
@@ -50,9 +51,9 @@ class Folder:
         return found.relative_to(self.root)
 
     def robots(self) -> list[str]:
-        """References of the shipped robots, of the folder's own and of those directly below."""
-        files = [*self.root.glob("parameters.yaml"), *self.root.glob("*/parameters.yaml")]
-        inside = (file for file in files if file.resolve().is_relative_to(self.root))
+        """References of the shipped robots, and of those in the folder and two levels below."""
+        files = (self.root.glob(f"{below}parameters.yaml") for below in ("", "*/", "*/*/"))
+        inside = (file for file in chain(*files) if file.resolve().is_relative_to(self.root))
         own = {str(file.parent.relative_to(self.root)) for file in inside}
         return [*shipped(), *sorted(own - {*shipped()})]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
@@ -22,9 +24,19 @@ from draft.variation.words import ranges
 if TYPE_CHECKING:
     from draft.learn.training.progress import Progress
 
+
+def _read(given: object) -> object:
+    """A list or an object that an assistant has sent as a text of JSON, else what is given."""
+    if isinstance(given, str) and given.startswith(("[", "{")):
+        with contextlib.suppress(ValueError, RecursionError):
+            given = json.loads(given)
+    return tuple(given) if isinstance(given, list) else given
+
+
 Texts = Annotated[
     tuple[str, ...],
     BeforeValidator(lambda given: (given,) if isinstance(given, str) else given),
+    BeforeValidator(_read),
     Shown(expects="a list of texts"),
 ]
 Reference = Annotated[
@@ -39,6 +51,7 @@ Set = Annotated[
         "scales), or null. Names are parameters, actuators.CLASS.QUANTITY, and payload [kg], a "
         "block on the trunk."
     ),
+    BeforeValidator(_read),
     Shown("", "none", expects="an object of numbers, texts and nulls by name"),
 ]
 Metrics = Annotated[Texts, Field(description="Metrics; empty for all closed-form ones.")]
