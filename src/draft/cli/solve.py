@@ -14,7 +14,7 @@ from rich.text import Text
 from draft.cli import explore_options as x
 from draft.cli.display.verdict import console, verdict
 from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
-from draft.values import brief
+from draft.values import told_apart
 
 if TYPE_CHECKING:
     from draft.design import Design
@@ -88,7 +88,7 @@ def _design_file(start: Design, found: Solution, conditions: tuple[str, ...]) ->
     lines = []
     for one in found.moved:
         why = f"; else {'; '.join(one.why)}" if one.why else ""
-        lines.append(f"# {one.name}: {brief(one.before)} -> {brief(one.after)}{why}")
+        lines.append(f"# {one.name}: {' -> '.join(told_apart(one.before, one.after))}{why}")
     values = dict(start.values) | {one.name: one.after for one in found.moved}
     document = {"doc": doc, "values": values}
     text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=1000)
@@ -117,7 +117,7 @@ def _print(start: Design, found: Solution, path: Path | None) -> None:
     table.add_column("to", justify="right", no_wrap=True)
     table.add_column("" if found.conflict else "without this change", style="dim")
     for one in found.moved:
-        row = one.name, brief(one.before), brief(one.after), "\n".join(one.why)
+        row = one.name, *told_apart(one.before, one.after), "\n".join(one.why)
         table.add_row(*(Text(cell) for cell in row))
     out.print("", table, "")
     out.print(f"change {100 * found.change:.3g} % of the ranges, {found.tried:,} designs computed")

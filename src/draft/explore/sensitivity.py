@@ -30,7 +30,7 @@ SAMPLES = 64
 _ENDS = (0.05, 0.95)
 _SHARE = 0.1  # A designer's step, about this share of a number.
 _DIGITS = (1.0, 2.0, 5.0, 10.0)
-_STILL = 1e-9  # Relative change that is rounding.
+STILL = 1e-9  # Relative change that is rounding.
 _KINK = 0.1  # Difference of both sides, over the larger, from which both are shown.
 
 
@@ -75,7 +75,7 @@ class Sensitivity:
     def still(self) -> NDArray[np.bool_]:
         """Numbers that change no metric, shape (P,)."""
         moves = [
-            np.nan_to_num(abs(one)) > _STILL * np.maximum(abs(self.base), 1e-300)
+            np.nan_to_num(abs(one)) > STILL * np.maximum(abs(self.base), 1e-300)
             for one in (self.step_up, self.step_down)
         ]
         flips = (self.accepted != self.accepted[:, 1:2]).any(axis=1)
@@ -169,7 +169,7 @@ def sensitivity(
     drawn = table[:, plain:].reshape(len(metrics), 1 + count, samples)
     with np.errstate(all="ignore"):  # A time without a limit has no change.
         change = np.where(known[..., None], moved - base, np.nan)  # (4, P, M)
-        change = np.where(abs(change) <= _STILL * abs(base), 0.0, change)
+        change = np.where(abs(change) <= STILL * abs(base), 0.0, change)
         relative = change[:2] / abs(base)
         apart = drawn[:, 1:] - drawn[:, :1]
     ends = np.quantile(apart, _ENDS, axis=2).swapaxes(1, 2)
