@@ -35,7 +35,7 @@ def main(
         tuple[str, ...],
         tyro.conf.arg(
             metavar="METRIC ...",
-            help="Metrics, of those that need no model ('draft metrics' lists them).",
+            help="Metrics, of those that need no policy ('draft metrics' lists them).",
             help_behavior_hint=f"(default: {', '.join(USUAL)})",
         ),
     ] = (),
@@ -202,7 +202,7 @@ def _cell(found: Sensitivity, i: int, k: int) -> str:
     if not math.isnan(low) and signed(low) != signed(high):
         text += f" ({signed(low)}..{signed(high)})"
     percent = found.up[i, k]
-    return text if math.isnan(percent) else f"{text}\n{100 * percent:+.2g} %"
+    return f"{text}\n{100 * percent:+.2g} %" if percent and not math.isnan(percent) else text
 
 
 def signed(change: float) -> str:

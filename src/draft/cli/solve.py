@@ -13,7 +13,7 @@ from rich.text import Text
 from draft.cli import explore_options as x
 from draft.cli.display.verdict import console, verdict
 from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
-from draft.values import brief
+from draft.values import told_apart
 
 if TYPE_CHECKING:
     from draft.design import Design
@@ -104,7 +104,7 @@ def _print(start: Design, found: Solution, path: Path | None) -> None:
     table.add_column("to", justify="right", no_wrap=True)
     table.add_column("" if found.conflict else "without this change", style="dim")
     for one in found.moved:
-        row = one.name, brief(one.before), brief(one.after), "\n".join(one.why)
+        row = one.name, *told_apart(one.before, one.after), "\n".join(one.why)
         table.add_row(*(Text(cell) for cell in row))
     out.print("", table, "")
     out.print(f"change {100 * found.change:.3g} % of the ranges, {found.tried:,} designs computed")
