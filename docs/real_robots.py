@@ -3,9 +3,13 @@
     python -m docs.real_robots                           # the page, from the measured columns
     python -m docs.real_robots --measure ../shared/robots/survey unitree_go2 unitree_a1
 
+    python -m docs.real_robots --measure ../shared/robots/survey --train runs/own unitree_go2
+
 With `--measure` it measures robots first, of which a folder has the descriptions, and writes what
 `draft twin FILE --capabilities --json` prints to examples/results/real_robots, and which errors of
-the masses cause what. The bands that Draft states of learnt capabilities follow from them.
+the masses cause what. The bands that Draft states of learnt capabilities follow from them. With
+`--train` as well it trains policies of each robot's own instead, with predicted masses, and writes
+their numbers to examples/results/own_policies.
 """
 
 from __future__ import annotations
@@ -25,16 +29,22 @@ from draft.cli.display.capabilities import SHOWN, record
 from draft.files import write
 from draft.learn.measuring.bands import FILE as BANDS
 from draft.learn.measuring.evaluation import setting
+from draft.learn.measuring.evaluation_options import Extras
 from draft.learn.measuring.policies import open_source
 from draft.plotting import decorate, make_folder
+from draft.twins.compare import compare_twin
+from draft.validation.arms import predicted
+from draft.validation.capabilities import measured
 from draft.validation.causes import JUDGED as CAUSED
 from draft.validation.causes import causes
 from draft.validation.compare import RealRobot, real_robot
+from draft.validation.own import own_policy
 from draft.validation.physics import USUAL
 from draft.values import brief
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, RESULTS = ROOT / "docs/real-robots.md", ROOT / "examples/results/real_robots"
+OWN = ROOT / "examples/results/own_policies"
 IMAGES = ROOT / "docs/images/real_robots"
 PHYSICS = ROOT / "examples/results/physics.json"  # Of `python -m benchmarks.physics --out`.
 UNDER = ("top_speed", "kick", "step_up", "walking_power")
@@ -44,6 +54,7 @@ JUDGED = {
     "payload_peak": "standing load [kg]",
     "walking_power": "power of a walk [W]",
 }
+LABELS = {"kick": "kick [m/s]"}
 INTRODUCTION = """\
 What Draft predicts of {count} machines from their makers' descriptions: joints, lengths, torques
 and speeds are the maker's, masses and inertias Draft's, with the machine held out of the trends.
@@ -72,6 +83,9 @@ one policy for all; the climbing policy has learnt from nine million steps and c
 the leg length, where papers jump. Where a machine has to be at its best, train it:
 `draft twin FILE --capabilities --train DIR`."""
 COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
+OWNED = ("top_speed", "kick", "walking_power")
+# Physics of the family's training, for policies that were trained with it too.
+HONEST = Extras(contact_time=0.01, delay=0.01)
 LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.
 
 
@@ -80,9 +94,18 @@ def main(
     /,
     measure: Path | None = None,
     policy: str | None = None,
+    train: Path | None = None,
+    seeds: int = 3,
+    iterations: int = 150,
 ) -> None:
     """Measure robots if asked, and write the page."""
-    if measure is not None:
+    if measure is not None and train is not None:
+        for seed in range(seeds):
+            for key in keys:
+                train_own(
+                    key, next(iter(sorted(measure.glob(f"{key}.*")))), train, seed, iterations
+                )
+    elif measure is not None:
         RESULTS.mkdir(parents=True, exist_ok=True)
         models = []
         for key in keys:
@@ -105,6 +128,23 @@ def _caused(found: RealRobot, policy: str | None) -> dict[str, dict[str, float]]
     if not found.policy or not found.verdicts:
         return {}
     return causes(found.twin, open_source(policy, blind=True), *setting("auto", "auto"))
+
+
+def train_own(key: str, file: Path, folder: Path, seed: int, iterations: int) -> None:
+    """Train and measure a policy of a robot's own with predicted masses, unless it is measured."""
+    path = OWN / f"{key}.json"
+    known = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {"seeds": {}}
+    if str(seed) in known["seeds"]:
+        return
+    print(key, seed, file=sys.stderr)
+    member = predicted(compare_twin(file, without=(key,), key=key, poses=2))
+    own = own_policy(member, folder / key, family=True, seed=seed, iterations=iterations)
+    found = measured(own, member, *setting("auto", "auto"), conditions=HONEST)
+    values = {name: found[name].value for name in OWNED if not math.isnan(found[name].value)}
+    known |= {"robot": key, "iterations": iterations}
+    known["seeds"][str(seed)] = {name: round(value, 4) for name, value in values.items()}
+    OWN.mkdir(parents=True, exist_ok=True)
+    write(path, json.dumps(known, indent=1) + "\n")
 
 
 def bands_of(found: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -195,6 +235,7 @@ def page(found: Sequence[dict[str, Any]]) -> str:
             "",
             *WHY.splitlines(),
             "",
+            *_own(found),
             "![Predicted over published top speed](images/real_robots/speeds.png)",
             "",
             "Blue: claims on the machine. Grey: below sqrt(g L), claims on a product.",
@@ -261,6 +302,31 @@ def _score(found: Sequence[dict[str, Any]]) -> list[str]:
             f"{len(folds)} machines."
         )
     return lines
+
+
+def _own(found: Sequence[dict[str, Any]]) -> list[str]:
+    """Table of the robots' own policies beside that of the family."""
+    rows = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(OWN.glob("*.json"))]
+    if not rows:
+        return []
+    family = {one["robot"]: one["predicted"] for one in found}
+    seeds = max(len(row["seeds"]) for row in rows)
+    lines = [
+        f"Policies of their own: {rows[0]['iterations']} iterations each from the family's, with",
+        f"predicted masses; that of the family, then the least and the greatest of {seeds} seeds.",
+        "",
+        "| robot | " + " | ".join(JUDGED.get(name, LABELS.get(name, "")) for name in OWNED) + " |",
+        "| --- |" + " --- |" * len(OWNED),
+    ]
+    for row in rows:
+        cells = []
+        for name in OWNED:
+            of = [one[name] for one in row["seeds"].values() if name in one]
+            known = family.get(row["robot"], {}).get(name, {}).get("value")
+            before = "-" if known is None else brief(known)
+            cells.append(f"{before}; {brief(min(of))} to {brief(max(of))}" if of else before)
+        lines.append(f"| {row['robot']} | " + " | ".join(cells) + " |")
+    return [*lines, ""]
 
 
 def _ratios(found: Sequence[dict[str, Any]]) -> list[str]:
