@@ -29,7 +29,6 @@ from draft.cli.display.capabilities import SHOWN, record
 from draft.files import write
 from draft.learn.measuring.bands import FILE as BANDS
 from draft.learn.measuring.evaluation import setting
-from draft.learn.measuring.evaluation_options import Extras
 from draft.learn.measuring.policies import open_source
 from draft.plotting import decorate, make_folder
 from draft.twins.compare import compare_twin
@@ -84,8 +83,6 @@ the leg length, where papers jump. Where a machine has to be at its best, train 
 `draft twin FILE --capabilities --train DIR`."""
 COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
 OWNED = ("top_speed", "kick", "walking_power")
-# Physics of the family's training, for policies that were trained with it too.
-HONEST = Extras(contact_time=0.01, delay=0.01)
 LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.
 
 
@@ -139,7 +136,7 @@ def train_own(key: str, file: Path, folder: Path, seed: int, iterations: int) ->
     print(key, seed, file=sys.stderr)
     member = predicted(compare_twin(file, without=(key,), key=key, poses=2))
     own = own_policy(member, folder / key, family=True, seed=seed, iterations=iterations)
-    found = measured(own, member, *setting("auto", "auto"), conditions=HONEST)
+    found = measured(own, member, *setting("auto", "auto"))
     values = {name: found[name].value for name in OWNED if not math.isnan(found[name].value)}
     known |= {"robot": key, "iterations": iterations}
     known["seeds"][str(seed)] = {name: round(value, 4) for name, value in values.items()}
