@@ -47,6 +47,13 @@ def brief(value: Value) -> str:
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e7 else f"{value:.3g}"
 
 
+def signed(change: float) -> str:
+    """Text of a change with three digits, with its sign; "-" for NaN."""
+    if math.isnan(change):
+        return "-"
+    return f"{'+' if change > 0 else ''}{brief(change)}" if change else "0"
+
+
 def _unary(
     on_float: Callable[[float], float], on_array: Callable[[Array], Array]
 ) -> Callable[[Value], Value]:

@@ -1,4 +1,4 @@
-"""Why designs differ: their metrics side by side, and what each changed number contributes.
+"""Why designs differ: metrics side by side, what each changed number contributes, what limits.
 
 A difference between two designs of one robot is divided over the numbers that differ by Shapley
 values: the mean effect of a number over all orders in which the numbers may be changed (Shapley
@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.design import Design
+from draft.design import Design, Finding
 from draft.design.error_samples import sample_errors
-from draft.errors import DraftError
-from draft.explore.sensitivity import stated_numbers
-from draft.metrics import METRICS, find, of_design
+from draft.design.findings import grouped
+from draft.errors import DraftError, ResolveError
+from draft.explore.sensitivity import closed_metrics, stated_numbers
+from draft.metrics import Limit, find, limits, of_design
 from draft.spec.payload import MASS
 from draft.values import Array, Value, scalar
 
@@ -58,17 +59,21 @@ class DesignComparison:
 
     Attributes:
         designs: the designs; the others are compared with the first.
+        names: their names, each another.
         metrics: names of the closed-form metrics.
         values: shape (designs, metrics).
         parts: for each other design why it differs; None for another robot.
-        findings: messages of the filter that not all designs have, for each design.
+        findings: findings of the filter that not all designs have, for each design.
+        limits: what limits each design by metric, the limit that binds first (`metrics.limits`).
     """
 
     designs: tuple[Design, ...]
+    names: tuple[str, ...]
     metrics: tuple[str, ...]
     values: Array
     parts: tuple[Part | None, ...]
     findings: tuple[tuple[str, ...], ...]
+    limits: tuple[Mapping[str, tuple[Limit, ...]], ...]
 
     def record(self) -> dict[str, Any]:
         """Plain data; None where there is no number."""
@@ -78,33 +83,62 @@ class DesignComparison:
             return dict(zip(self.metrics, known, strict=True))
 
         others = []
-        for design, part in zip(self.designs[1:], self.parts, strict=True):
-            record: dict[str, Any] = {"design": design.reference, "same_robot": part is not None}
+        for name, part in zip(self.names[1:], self.parts, strict=True):
+            record: dict[str, Any] = {"design": name, "same_robot": part is not None}
             if part is not None:
                 record["better"] = row(part.better)
                 record["exact"] = part.exact
                 record["shares"] = {
-                    name: {"from": part.before[i], "to": part.after[i], **row(part.shares[i])}
-                    for i, name in enumerate(part.names)
+                    number: {"from": part.before[i], "to": part.after[i], **row(part.shares[i])}
+                    for i, number in enumerate(part.names)
                 }
             others.append(record)
         return {
             "designs": {
-                one.reference: row(values)
-                for one, values in zip(self.designs, self.values, strict=True)
+                name: row(values) for name, values in zip(self.names, self.values, strict=True)
             },
             "against_first": others,
+            "limits": {
+                name: {metric: _limits(found) for metric, found in own.items()}
+                for name, own in zip(self.names, self.limits, strict=True)
+            },
             "findings_alone": {
-                one.reference: list(own)
-                for one, own in zip(self.designs, self.findings, strict=True)
+                name: list(own) for name, own in zip(self.names, self.findings, strict=True)
             },
         }
 
 
+def _limits(found: Sequence[Limit]) -> dict[str, Any]:
+    """The limit that binds, the next one, and how far that is."""
+    first, following = found[0], found[1] if len(found) > 1 else None
+    margin = None if following is None else abs(following.value - first.value)
+    return {
+        **first._asdict(),
+        "next": None if following is None else following._asdict(),
+        "margin": margin,
+    }
+
+
+def unique(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of which a later one that is there already has a number."""
+    found: list[str] = []
+    for name in names:
+        number, made = 2, name
+        while made in found:
+            number, made = number + 1, f"{name} {number}"
+        found.append(made)
+    return tuple(found)
+
+
 def compare(
-    designs: Sequence[Design], of: Sequence[str] = (), *, seed: int = 0, samples: int = SAMPLES
+    designs: Sequence[Design],
+    of: Sequence[str] = (),
+    *,
+    names: Sequence[str] = (),
+    seed: int = 0,
+    samples: int = SAMPLES,
 ) -> DesignComparison:
-    """Compare designs by their closed-form metrics, and say why they differ.
+    """Compare designs by their closed-form metrics, and say why they differ and what limits each.
 
         >>> spec = draft.load("quadruped")
         >>> found = draft.compare([spec.resolve("cheetah"), spec.resolve("bear")], ["mass"])
@@ -115,6 +149,7 @@ def compare(
     Args:
         designs: two single designs or more.
         of: metrics; empty for all that need no model.
+        names: names of the designs; empty for their references.
         seed: seed of the samples.
         samples: samples of the errors of the laws.
 
@@ -125,20 +160,36 @@ def compare(
         raise DraftError("there is nothing to compare", "give two designs or more")
     if any(one.count is not None for one in designs):
         raise DraftError("comparisons are of single designs", "select one, such as `design[0]`")
-    names = tuple(of) or tuple(
-        one.name for one in METRICS.values() if one.needs == "design" and one.unit != "bool"
-    )
-    table = [of_design(one, names) for one in designs]
-    values = np.array([[scalar(row[name]) for name in names] for row in table])
+    metrics = tuple(dict.fromkeys(of)) or closed_metrics(())
+    table = [of_design(one, metrics) for one in designs]
+    values = np.array([[scalar(row[name]) for name in metrics] for row in table])
     first, *others = designs
     parts = tuple(
-        _part(first, other, names, seed, samples) if _same_robot(first, other) else None
+        _part(first, other, metrics, seed, samples) if _same_robot(first, other) else None
         for other in others
     )
-    messages = [{f"{f.id}: {f.message}" for f in one.findings} for one in designs]
-    shared = set.intersection(*messages)
-    findings = tuple(tuple(sorted(own - shared)) for own in messages)
-    return DesignComparison(tuple(designs), names, values, parts, findings)
+    shared = set.intersection(*({_kind(f) for f in one.findings} for one in designs))
+    findings = tuple(
+        tuple(
+            f"{f.severity} {f.id}: {f.message}"
+            for f in grouped(f for f in one.findings if _kind(f) not in shared)
+        )
+        for one in designs
+    )
+    return DesignComparison(
+        designs=tuple(designs),
+        names=unique(names or [one.reference for one in designs]),
+        metrics=metrics,
+        values=values,
+        parts=parts,
+        findings=findings,
+        limits=tuple(limits(one, metrics) for one in designs),
+    )
+
+
+def _kind(finding: Finding) -> tuple[str, ...]:
+    """What two designs have in common that have a finding alike, with other numbers."""
+    return finding.severity, finding.id, finding.where
 
 
 def _same_robot(a: Design, b: Design) -> bool:
@@ -166,7 +217,10 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
                     given[names[i]] = setting
             for i in numeric:
                 given[names[i]] = np.where(chosen[rows, i], after[names[i]], before[names[i]])
-            row = of_design(spec.resolve(given), metrics)
+            try:
+                row = of_design(spec.resolve(given), metrics)
+            except ResolveError:
+                continue  # No robot between the two has these settings.
             for k, name in enumerate(metrics):
                 found[rows, k] = row[name]
         return found

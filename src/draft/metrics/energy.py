@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -11,10 +12,12 @@ from draft.design import Design
 from draft.design.battery import battery
 from draft.design.electronics import electronics
 from draft.design.legs import GRAVITY
+from draft.design.loads import loads
 from draft.errors import DraftError
+from draft.metrics.limiting import Limit, at_joint
 from draft.metrics.registry import metric
-from draft.metrics.statics import cost_of_standing
-from draft.values import Value, divide
+from draft.metrics.statics import cost_of_standing, heat
+from draft.values import Value, divide, scalar
 
 JOULES_PER_WATT_HOUR = 3600.0
 
@@ -34,11 +37,22 @@ def standing_power(design: Design) -> Value:
     return electronics(design).power + cost_of_standing(design) * design.mass
 
 
+def _endurance_limits(design: Design) -> Iterator[Limit]:
+    """Time for which the battery would supply each consumer alone."""
+    energy = battery(design).energy
+    if loads(design):
+        idle = divide(energy, electronics(design).power)
+        yield Limit(scalar(idle), "power of the electronics")
+    for x in loads(design):
+        yield at_joint(x.joint, x.actuator, "heat of the motors", divide(energy, heat(x)))
+
+
 @metric(
     unit="h",
     formula="energy of the battery / standing_power",
     source="energy of surveyed batteries, docs/limits.md; power as standing_power",
     better="more",
+    limits=_endurance_limits,
 )
 def endurance_standing(design: Design) -> Value:
     """Time that the battery lasts while the robot stands in the crouch [h].

@@ -15,19 +15,13 @@ from draft.design import Design
 from draft.errors import DraftError
 from draft.explore.sensitivity import sensitivity, stated_numbers
 from draft.explore.solve import Solution, solve
-from draft.metrics import METRICS, find, of_design
+from draft.metrics import find, of_design
 from draft.studio import fields
 from draft.values import Array, brief, scalar
 
 NOTHING = "(none)"
 _POINTS, _ROUNDS = 65, 3  # Of the search for the value that holds a metric.
 _EVEN = 1e-9  # Relative change of a metric that counts as none.
-
-
-def metrics() -> list[str]:
-    """Metrics that a slider's effect on can be shown at once."""
-    closed = (one for one in METRICS.values() if one.needs == "design")
-    return [one.name for one in closed if one.unit != "bool"]
 
 
 @dataclass
