@@ -20,7 +20,7 @@ LIMITED = (
     *("standing_torque_rated", "endurance_standing"),
 )
 _SMALL = 0.005  # Share of a difference below which a number is left out.
-_CAUSES = 2  # Numbers that are named as the largest causes.
+_NAMED = 2  # Numbers that are named as the largest shares.
 
 
 class TextTable(NamedTuple):
@@ -43,9 +43,9 @@ class Section(NamedTuple):
     """A comparison as text.
 
     Attributes:
-        summary: of some metrics the unit, the values, and for each other design of the same robot
-            the probability that it is better than the first, and the largest causes.
-        metrics: the same of all metrics, without causes.
+        summary: of some metrics the unit, the values, for each other design of the same robot the
+            probability that it is better than the first, and, of two designs, the largest shares.
+        metrics: the same of all metrics, without shares.
         shares: what each number contributes to the differences, for each other design; a text for
             another robot.
         limits: what limits each design.
@@ -79,7 +79,7 @@ def section(found: DesignComparison, of: Sequence[str] = ()) -> Section:
         for message in messages
     )
     return Section(
-        summary=_metrics(found, titles, divided, True),
+        summary=_metrics(found, titles, divided, len(titles) == 2),
         metrics=_metrics(found, titles, range(len(found.metrics)), False),
         shares=shares,
         limits=_limits(found, titles, of),
@@ -93,9 +93,9 @@ def _another(first: str, other: str) -> str:
 
 
 def _metrics(
-    found: DesignComparison, titles: Sequence[str], chosen: Sequence[int], causes: bool
+    found: DesignComparison, titles: Sequence[str], chosen: Sequence[int], largest: bool
 ) -> TextTable:
-    """Values of metrics, the probability that each other design is better, and the causes."""
+    """Values of metrics, the probability that each other design is better, and largest shares."""
     known = [(t, p) for t, p in zip(titles[1:], found.parts, strict=True) if p is not None]
     rows = []
     for k in chosen:
@@ -103,9 +103,9 @@ def _metrics(
         cells = [metric.name, metric.unit.removeprefix("1")]
         cells += [value_text(x) for x in found.values[:, k]]
         for _, part in known:
-            cells += [odds_text(part.better[k]), *[_causes(part, k)] * causes]
+            cells += [odds_text(part.better[k]), *[_largest(part, k)] * largest]
         rows.append(tuple(cells))
-    heads = [(f"{title} better", *["because of"] * causes) for title, _ in known]
+    heads = [(f"{title} better", *["largest shares"] * largest) for title, _ in known]
     head = ("metric", "", *titles, *(word for words in heads for word in words))
     return TextTable("", head, tuple(rows))
 
@@ -134,12 +134,12 @@ def _shares(
     return TextTable(heading, ("number", "from", "to", *changes), tuple(rows), "\n".join(notes))
 
 
-def _causes(part: Part, k: int) -> str:
+def _largest(part: Part, k: int) -> str:
     """The numbers that contribute most to the difference of a metric."""
     own = np.nan_to_num(part.shares[:, k])
-    largest = np.argsort(-abs(own), kind="stable")[:_CAUSES]
+    order = np.argsort(-abs(own), kind="stable")[:_NAMED]
     most = abs(own).max(initial=0.0)
-    named = [i for i in largest if abs(own[i]) > _SMALL * most]
+    named = [i for i in order if abs(own[i]) > _SMALL * most]
     return ", ".join(f"{_short(part.names[i])} {signed(own[i])}" for i in named)
 
 

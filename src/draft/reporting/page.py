@@ -153,9 +153,11 @@ def _comparison(
     if compared is None:
         return ""
     found = comparison_section(compared)
-    shares = (
+    shares = [
         f"<p>{text(one)}</p>" if isinstance(one, str) else tables.plain(one) for one in found.shares
-    )
+    ]
+    if len(shares) > 1:
+        shares = [_details("Shares of the numbers that differ", Html("".join(shares)))]
     alone = "".join(f"<li>{text(line)}</li>" for line in found.alone)
     return _section(
         "comparison",
