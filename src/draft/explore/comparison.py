@@ -23,6 +23,7 @@ from draft.design.findings import grouped
 from draft.errors import DraftError, ResolveError
 from draft.explore.sensitivity import closed_metrics, stated_numbers
 from draft.metrics import Limit, find, limits, of_design
+from draft.metrics.registry import reads_verdict
 from draft.spec.payload import MASS
 from draft.values import Array, Value, scalar
 
@@ -201,6 +202,7 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
     before, after = _differing(a, b)
     names = tuple(before)
     spec = a.spec if "payload" in a.spec.parameters else b.spec
+    judge = reads_verdict(metrics)
     base = {key: value for key, value in {**b.values, **a.values}.items() if key not in before}
     numeric = [i for i, n in enumerate(names) if _real(before[n]) and _real(after[n])]
     others = [i for i in range(len(names)) if i not in numeric]
@@ -218,7 +220,7 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
             for i in numeric:
                 given[names[i]] = np.where(chosen[rows, i], after[names[i]], before[names[i]])
             try:
-                row = of_design(spec.resolve(given), metrics)
+                row = of_design(spec.resolve(given, judge=judge), metrics)
             except ResolveError:
                 continue  # No robot between the two has these settings.
             for k, name in enumerate(metrics):
@@ -304,8 +306,10 @@ def _shapley(
 def _better(a: Design, b: Design, metrics: Sequence[str], seed: int, samples: int) -> Array:
     """Probability that the other design is better in each metric, shape (metrics,)."""
     errors = sample_errors(a, samples, seed, b)
+    judge = reads_verdict(metrics)
     rows: list[Mapping[str, Value]] = [
-        of_design(one.spec.resolve(one.values, errors=errors), metrics) for one in (a, b)
+        of_design(one.spec.resolve(one.values, errors=errors, judge=judge), metrics)
+        for one in (a, b)
     ]
     found = np.full(len(metrics), np.nan)
     for k, name in enumerate(metrics):

@@ -105,6 +105,11 @@ def metric(
     return register
 
 
+def reads_verdict(names: Iterable[str]) -> bool:
+    """Whether metrics may read the findings of the filter: masks, and those of extensions."""
+    return any(find(name).unit == "bool" or METRICS.origin(name) for name in names)
+
+
 def unknown(name: str) -> Problem:
     """Problem of a name that no metric has: what was renamed, or the nearest name."""
     if name in RENAMED:
