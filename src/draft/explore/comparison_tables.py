@@ -45,7 +45,7 @@ class Section(NamedTuple):
     Attributes:
         summary: of some metrics the unit, the values, for each other design of the same robot the
             probability that it is better than the first, and, of two designs, the largest shares.
-        metrics: the same of all metrics, without shares.
+        metrics: the same of all metrics that a design has, without shares.
         shares: what each number contributes to the differences, for each other design; a text for
             another robot.
         limits: what limits each design.
@@ -69,6 +69,8 @@ def section(found: DesignComparison, of: Sequence[str] = ()) -> Section:
     titles = [name.rpartition(":")[2] for name in found.names]
     titles = titles if len({*titles}) == len(titles) else list(found.names)
     divided = [k for name in of or USUAL for k, one in enumerate(found.metrics) if one == name]
+    measured = ~np.isnan(found.values).all(axis=0)
+    known = [k for k, name in enumerate(found.metrics) if measured[k] or name in of]
     shares = tuple(
         _another(titles[0], title) if part is None else _shares(found, part, divided, titles, title)
         for title, part in zip(titles[1:], found.parts, strict=True)
@@ -80,7 +82,7 @@ def section(found: DesignComparison, of: Sequence[str] = ()) -> Section:
     )
     return Section(
         summary=_metrics(found, titles, divided, len(titles) == 2),
-        metrics=_metrics(found, titles, range(len(found.metrics)), False),
+        metrics=_metrics(found, titles, known, False),
         shares=shares,
         limits=_limits(found, titles, of),
         alone=alone,

@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from draft import geometry as g
 from draft.design import Design
 from draft.design.battery import battery
 from draft.design.electronics import electronics
 from draft.design.legs import GRAVITY
-from draft.design.loads import loads
+from draft.design.loads import LegLoad, loads
 from draft.errors import DraftError
-from draft.metrics.limiting import Limit, at_joint
+from draft.metrics.limiting import Limit, shared_end
 from draft.metrics.registry import metric
 from draft.metrics.statics import cost_of_standing, heat
 from draft.values import Value, divide, scalar
@@ -43,8 +44,13 @@ def _endurance_limits(design: Design) -> Iterator[Limit]:
     if loads(design):
         idle = divide(energy, electronics(design).power)
         yield Limit(scalar(idle), "power of the electronics")
+    alike: dict[tuple[str, str], list[LegLoad]] = {}
     for x in loads(design):
-        yield at_joint(x.joint, x.actuator, "heat of the motors", divide(energy, heat(x)))
+        alike.setdefault((x.actuator.name, shared_end(x.joint.names)), []).append(x)
+    for (actuator, _), own in alike.items():
+        hours = scalar(divide(energy, g.total(map(heat, own))))
+        joints = tuple(name for x in own for name in x.joint.names)
+        yield Limit(hours, "heat of the motors", joints, actuator)
 
 
 @metric(

@@ -72,7 +72,7 @@ def _merged(given: Iterable[Limit]) -> list[Limit]:
     found: dict[object, Limit] = {}
     for one in given:
         if abs(one.value) < _NONE:  # Of NaN as well.
-            key = (f"{one.value:.{_TIE}g}", one.quantity, one.actuator, _end(one.joints))
+            key = (f"{one.value:.{_TIE}g}", one.quantity, one.actuator, shared_end(one.joints))
             first = found.get(key)
             found[key] = one if first is None else first._replace(joints=first.joints + one.joints)
     return list(found.values())
@@ -85,12 +85,12 @@ def where(limit: Limit, among: Sequence[Limit]) -> str:
         limit: the limit.
         among: all limits of the capability.
     """
-    end = _end(limit.joints)
-    others = {one.joints for one in among if one.joints and _end(one.joints) == end}
+    end = shared_end(limit.joints)
+    others = {one.joints for one in among if one.joints and shared_end(one.joints) == end}
     return end if end and len(others) == 1 else ", ".join(limit.joints)
 
 
-def _end(names: Sequence[str]) -> str:
+def shared_end(names: Sequence[str]) -> str:
     """Last words that all names have: "knee" of left_knee and right_knee."""
     words = [name.split("_") for name in names]
     shared: list[str] = []
