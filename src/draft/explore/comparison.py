@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from draft.values import Array, Value, scalar
 EXACT = 10  # Numbers whose orders are all counted.
 SAMPLES, ORDERS = 2000, 200
 Setting = Value | str | None
+Measure = Callable[[Design], Mapping[str, Value]]
 _MISSING = object()  # A design does not state the number.
 
 
@@ -162,11 +164,13 @@ def compare(
     if any(one.count is not None for one in designs):
         raise DraftError("comparisons are of single designs", "select one, such as `design[0]`")
     metrics = tuple(dict.fromkeys(of)) or closed_metrics(())
-    table = [of_design(one, metrics) for one in designs]
+    # A metric of an extension that fails is NaN unless it is named.
+    measure = partial(of_design, names=metrics if of else None)
+    table = [measure(one) for one in designs]
     values = np.array([[scalar(row[name]) for name in metrics] for row in table])
     first, *others = designs
     parts = tuple(
-        _part(first, other, metrics, seed, samples) if _same_robot(first, other) else None
+        _part(first, other, metrics, measure, seed, samples) if _same_robot(first, other) else None
         for other in others
     )
     shared = set.intersection(*({_kind(f) for f in one.findings} for one in designs))
@@ -184,7 +188,7 @@ def compare(
         values=values,
         parts=parts,
         findings=findings,
-        limits=tuple(limits(one, metrics) for one in designs),
+        limits=tuple(limits(one, of) for one in designs),
     )
 
 
@@ -198,7 +202,9 @@ def _same_robot(a: Design, b: Design) -> bool:
     return a.spec is b.spec or (a.spec.name, a.spec.folder) == (b.spec.name, b.spec.folder)
 
 
-def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: int) -> Part:
+def _part(
+    a: Design, b: Design, metrics: tuple[str, ...], measure: Measure, seed: int, samples: int
+) -> Part:
     before, after = _differing(a, b)
     names = tuple(before)
     spec = a.spec if "payload" in a.spec.parameters else b.spec
@@ -220,7 +226,7 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
             for i in numeric:
                 given[names[i]] = np.where(chosen[rows, i], after[names[i]], before[names[i]])
             try:
-                row = of_design(spec.resolve(given, judge=judge), metrics)
+                row = measure(spec.resolve(given, judge=judge))
             except ResolveError:
                 continue  # No robot between the two has these settings.
             for k, name in enumerate(metrics):
@@ -230,7 +236,7 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
     exact = len(names) <= EXACT
     with np.errstate(invalid="ignore"):  # A time without a limit has no difference.
         shares = _shapley(len(names), measured, seed, exact)
-        better = _better(a, b, metrics, seed, samples)
+        better = _better(a, b, metrics, measure, seed, samples)
     texts = [tuple(_text(of[name]) for name in names) for of in (before, after)]
     return Part(names, texts[0], texts[1], shares, better, exact)
 
@@ -303,14 +309,13 @@ def _shapley(
     return shares / ORDERS
 
 
-def _better(a: Design, b: Design, metrics: Sequence[str], seed: int, samples: int) -> Array:
+def _better(
+    a: Design, b: Design, metrics: Sequence[str], measure: Measure, seed: int, samples: int
+) -> Array:
     """Probability that the other design is better in each metric, shape (metrics,)."""
     errors = sample_errors(a, samples, seed, b)
     judge = reads_verdict(metrics)
-    rows: list[Mapping[str, Value]] = [
-        of_design(one.spec.resolve(one.values, errors=errors, judge=judge), metrics)
-        for one in (a, b)
-    ]
+    rows = [measure(one.spec.resolve(one.values, errors=errors, judge=judge)) for one in (a, b)]
     found = np.full(len(metrics), np.nan)
     for k, name in enumerate(metrics):
         direction = find(name).better

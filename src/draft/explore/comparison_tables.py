@@ -69,8 +69,11 @@ def section(found: DesignComparison, of: Sequence[str] = ()) -> Section:
     titles = [name.rpartition(":")[2] for name in found.names]
     titles = titles if len({*titles}) == len(titles) else list(found.names)
     divided = [k for name in of or USUAL for k, one in enumerate(found.metrics) if one == name]
-    measured = ~np.isnan(found.values).all(axis=0)
-    known = [k for k, name in enumerate(found.metrics) if measured[k] or name in of]
+    known = [
+        k
+        for k, name in enumerate(found.metrics)
+        if name in of or not np.isnan(found.values[:, k]).all()
+    ]
     shares = tuple(
         _another(titles[0], title) if part is None else _shares(found, part, divided, titles, title)
         for title, part in zip(titles[1:], found.parts, strict=True)
@@ -142,7 +145,7 @@ def _largest(part: Part, k: int) -> str:
     order = np.argsort(-abs(own), kind="stable")[:_NAMED]
     most = abs(own).max(initial=0.0)
     named = [i for i in order if abs(own[i]) > _SMALL * most]
-    return ", ".join(f"{_short(part.names[i])} {signed(own[i])}" for i in named)
+    return ", ".join(f"{_short(part.names[i])} {signed(float(own[i]))}" for i in named)
 
 
 def _limits(found: DesignComparison, titles: Sequence[str], of: Sequence[str]) -> TextTable:

@@ -6,6 +6,7 @@ at its rated torque, names each of them by `@metric(limits=...)`, from the terms
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from draft.design import Design
 from draft.design.actuators import Actuator
 from draft.design.legs import LegJoint
 from draft.errors import DraftError
+from draft.extensions import ExtensionWarning
 from draft.metrics.registry import METRICS
 from draft.values import Value, scalar
 
@@ -53,7 +55,8 @@ def limits(design: Design, names: Sequence[str] = ()) -> dict[str, tuple[Limit, 
         names: names of metrics; empty for all. Those without limits are left out.
 
     Raises:
-        DraftError: the design is several.
+        DraftError: the design is several, or the limits of an extension's metric fail; of all
+            metrics, that one is left out, with a warning.
     """
     if design.count is not None:
         raise DraftError("limits are those of one design", "select one, such as `design[0]`")
@@ -62,7 +65,15 @@ def limits(design: Design, names: Sequence[str] = ()) -> dict[str, tuple[Limit, 
         if metric.limits is None or (names and metric.name not in names):
             continue
         sign = 1.0 if metric.better == "more" else -1.0
-        if known := _merged(metric.limits(design)):
+        try:
+            with METRICS.calls(metric.name, "correct its limits"):
+                known = _merged(metric.limits(design))
+        except DraftError as error:
+            if names:
+                raise
+            warnings.warn(error.problems[0].cause, ExtensionWarning, stacklevel=2)
+            continue
+        if known:
             found[metric.name] = tuple(sorted(known, key=lambda one: sign * one.value))
     return found
 
