@@ -172,6 +172,16 @@ def test_a_table_names_the_largest_shares() -> None:
     assert length[-2:] == ("", "thigh_length +0.05")
 
 
+def test_what_changes_by_rounding_alone_has_no_share() -> None:
+    humanoid = draft.load("humanoid")
+    longer = humanoid.resolve({"thigh_length": 0.21})
+    found = compare([humanoid.resolve(), longer], ["top_speed", "mass"])
+    part = found.parts[0]
+    assert part is not None
+    assert part.shares[0, 0] == 0.0
+    assert section(found, found.metrics).summary.rows[0][-1] == ""
+
+
 def test_where_no_robot_is_between_two_designs_there_is_no_share(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from html import escape
 
@@ -17,6 +18,7 @@ from draft.metrics import of_design
 from draft.studio.levers import Levers, between, effect_text, hold, to_target
 from draft.studio.library import Library
 from draft.studio.pinned_tab import comparison_card
+from draft.studio.report_page import report_page
 from draft.studio.session import Session
 from draft.values import scalar
 
@@ -77,6 +79,13 @@ def test_the_card_of_a_pinned_design_has_the_numbers_of_the_comparison() -> None
         assert f"{now} {before} {escape(odds)}" in row
         assert shares in row
     assert "knee: rated torque (leg)" in card
+    pytest.importorskip("plotly")
+    record = draft.compare([pinned.design, session.design]).record()["against_first"][0]
+    data = re.search(r'id="draft-report">(.+?)</script>', report_page(session))
+    assert data is not None
+    own = json.loads(data[1])["comparison"]["against_first"][0]
+    assert own["shares"] == record["shares"]
+    assert own["better"] == record["better"]
 
 
 def test_a_follower_that_ends_says_so() -> None:

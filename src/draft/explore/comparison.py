@@ -30,6 +30,7 @@ from draft.values import Array, Value, scalar
 
 EXACT = 10  # Numbers whose orders are all counted.
 SAMPLES, ORDERS = 2000, 200
+_ROUNDING = 1e-12  # Share of a metric's value that is rounding.
 Setting = Value | str | None
 Measure = Callable[[Design], Mapping[str, Value]]
 _MISSING = object()  # A design does not state the number.
@@ -237,6 +238,8 @@ def _part(
     with np.errstate(invalid="ignore"):  # A time without a limit has no difference.
         shares = _shapley(len(names), measured, seed, exact)
         better = _better(a, b, metrics, measure, seed, samples)
+        ends = measured(np.array([[False], [True]]).repeat(len(names), axis=1))
+        shares[abs(shares) <= _ROUNDING * abs(ends).max(axis=0)] = 0.0
     texts = [tuple(_text(of[name]) for name in names) for of in (before, after)]
     return Part(names, texts[0], texts[1], shares, better, exact)
 

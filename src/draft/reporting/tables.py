@@ -79,7 +79,7 @@ def plain(of: TextTable, kind: str = "") -> Html:
     """
     heads = [cell.partition("\n") for cell in of.head]
     head = [Html(escape(a) + (f"<small>{escape(b)}</small>" if b else "")) for a, _, b in heads]
-    title = f"<h3>{text(of.title)}</h3>" if of.title else ""
+    title = f"<h3>{text(of.title[:1].upper() + of.title[1:])}</h3>" if of.title else ""
     note = "".join(f"<p><small>{text(line)}</small></p>" for line in of.note.splitlines())
     return Html(f"{title}{table(head, of.rows, kind)}{note}")
 

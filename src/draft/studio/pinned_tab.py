@@ -62,7 +62,7 @@ class PinnedTab:
                 self._tab = self._panel.add_tab("Pinned")
                 with self._tab:
                     self._html = gui.add_html(content)
-            else:
+            elif self._html.content != content:
                 self._html.content = content
         self._tasks.submit("compare", lambda: self._compare(pair))
 
