@@ -36,7 +36,8 @@ def main(
 ) -> int:
     """Show designs side by side, which number makes what difference, and what limits.
 
-    Each metric has the probability that a design is better than the first.
+    Metrics are those that need no model, each with the probability that a design is better than the
+    first.
     """
     if len(references) < 2:
         raise DraftError("two designs or more are compared", "such as draft compare cheetah bear")

@@ -39,7 +39,7 @@ OfMetrics = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
         metavar="METRIC ...",
-        help="Metrics, of those that need no model ('draft metrics' lists them).",
+        help="Metrics ('draft metrics' lists them), none that needs a policy.",
         help_behavior_hint=f"(default: {', '.join(USUAL)})",
     ),
 ]

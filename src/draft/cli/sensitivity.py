@@ -194,7 +194,7 @@ def _cell(found: Sensitivity, i: int, k: int) -> str:
     if not math.isnan(low) and signed(low) != signed(high):
         text += f" ({signed(low)}..{signed(high)})"
     percent = found.up[i, k]
-    return text if math.isnan(percent) else f"{text}\n{100 * percent:+.2g} %"
+    return f"{text}\n{100 * percent:+.2g} %" if percent and not math.isnan(percent) else text
 
 
 def _short(name: str) -> str:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json as jsons
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
-import yaml
 from rich.table import Table
 from rich.text import Text
 
 from draft.cli import explore_options as x
 from draft.cli.display.verdict import console, verdict
 from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
-from draft.values import brief
+from draft.values import told_apart
 
 if TYPE_CHECKING:
     from draft.design import Design
@@ -74,25 +73,13 @@ def main(
     if found.conflict is None and found.moved:
         name = resolved.reference.replace(":", "-")
         path = out or Path(f"out/{name}-solved.yaml")
-        files.write(path, _design_file(resolved, found, conditions))
+        files.write(path, found.design_file(resolved, conditions))
     if json:
-        print(jsons.dumps(_record(found, path), indent=2, allow_nan=False))
+        record = found.record() | {"file": None if path is None else str(path)}
+        print(jsons.dumps(record, indent=2, allow_nan=False))
     else:
         _print(resolved, found, path)
     return 0 if found.conflict is None else NOT_MET
-
-
-def _design_file(start: Design, found: Solution, conditions: tuple[str, ...]) -> str:
-    """Text of the design file: the values, and above them why each number moved."""
-    doc = f"Nearest to {start.reference} with {', '.join(conditions)}."
-    lines = []
-    for one in found.moved:
-        why = f"; else {'; '.join(one.why)}" if one.why else ""
-        lines.append(f"# {one.name}: {brief(one.before)} -> {brief(one.after)}{why}")
-    values = dict(start.values) | {one.name: one.after for one in found.moved}
-    document = {"doc": doc, "values": values}
-    text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=1000)
-    return "\n".join([*lines, text])
 
 
 def _print(start: Design, found: Solution, path: Path | None) -> None:
@@ -117,25 +104,9 @@ def _print(start: Design, found: Solution, path: Path | None) -> None:
     table.add_column("to", justify="right", no_wrap=True)
     table.add_column("" if found.conflict else "without this change", style="dim")
     for one in found.moved:
-        row = one.name, brief(one.before), brief(one.after), "\n".join(one.why)
+        row = one.name, *told_apart(one.before, one.after), "\n".join(one.why)
         table.add_row(*(Text(cell) for cell in row))
     out.print("", table, "")
     out.print(f"change {100 * found.change:.3g} % of the ranges, {found.tried:,} designs computed")
     if path is not None:
         out.print(str(path), markup=False)
-
-
-def _record(found: Solution, path: Path | None) -> dict[str, Any]:
-    conflict = found.conflict
-    return {
-        "met": conflict is None,
-        "change": found.change,
-        "moved": [
-            {"name": one.name, "from": one.before, "to": one.after, "why": list(one.why)}
-            for one in found.moved
-        ],
-        "excluded_together": [] if conflict is None else list(conflict.conditions),
-        "misses": [] if conflict is None else list(conflict.misses),
-        "designs_computed": found.tried,
-        "file": None if path is None else str(path),
-    }

@@ -22,7 +22,7 @@ from draft.design import Design, Finding
 from draft.design.error_samples import sample_errors
 from draft.design.findings import grouped
 from draft.errors import DraftError, ResolveError
-from draft.explore.sensitivity import closed_metrics, stated_numbers
+from draft.explore.sensitivity import STILL, closed_metrics, stated_numbers
 from draft.metrics import Limit, find, limits, of_design
 from draft.metrics.registry import reads_verdict
 from draft.spec.payload import MASS
@@ -164,7 +164,7 @@ def compare(
         raise DraftError("there is nothing to compare", "give two designs or more")
     if any(one.count is not None for one in designs):
         raise DraftError("comparisons are of single designs", "select one, such as `design[0]`")
-    metrics = tuple(dict.fromkeys(of)) or closed_metrics(())
+    metrics = closed_metrics(of)
     # A metric of an extension that fails is NaN unless it is named.
     measure = partial(of_design, names=metrics if of else None)
     table = [measure(one) for one in designs]
@@ -239,7 +239,9 @@ def _part(
         shares = _shapley(len(names), measured, seed, exact)
         better = _better(a, b, metrics, measure, seed, samples)
         ends = measured(np.array([[False], [True]]).repeat(len(names), axis=1))
-        shares[abs(shares) <= _ROUNDING * abs(ends).max(axis=0)] = 0.0
+        rounding = np.where(abs(ends) < math.inf, _ROUNDING * abs(ends), 0.0).max(axis=0)
+        least = np.fmax(STILL * abs(shares).max(axis=0, initial=0.0), rounding)
+        shares[abs(shares) <= least] = 0.0
     texts = [tuple(_text(of[name]) for name in names) for of in (before, after)]
     return Part(names, texts[0], texts[1], shares, better, exact)
 

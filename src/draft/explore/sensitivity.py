@@ -19,7 +19,7 @@ from draft.design import Design
 from draft.design.error_samples import sample_errors
 from draft.errors import DraftError, suggest
 from draft.metrics import METRICS, find, of_design
-from draft.metrics.measure import needs_more
+from draft.metrics.measure import needs_more, of_batch
 from draft.metrics.registry import reads_verdict
 from draft.spec.check import key_problem
 from draft.spec.payload import with_payload
@@ -31,7 +31,7 @@ SAMPLES = 64
 _ENDS = (0.05, 0.95)
 _SHARE = 0.1  # A designer's step, about this share of a number.
 _DIGITS = (1.0, 2.0, 5.0, 10.0)
-_STILL = 1e-9  # Relative change that is rounding.
+STILL = 1e-9  # Relative change that is rounding.
 _KINK = 0.1  # Difference of both sides, over the larger, from which both are shown.
 
 
@@ -76,7 +76,7 @@ class Sensitivity:
     def still(self) -> NDArray[np.bool_]:
         """Numbers that change no metric, shape (P,)."""
         moves = [
-            np.nan_to_num(abs(one)) > _STILL * np.maximum(abs(self.base), 1e-300)
+            np.nan_to_num(abs(one)) > STILL * np.maximum(abs(self.base), 1e-300)
             for one in (self.step_up, self.step_down)
         ]
         flips = (self.accepted != self.accepted[:, 1:2]).any(axis=1)
@@ -126,7 +126,7 @@ def sensitivity(
     seed: int = 0,
     verdicts: bool = True,
 ) -> Sensitivity:
-    """Effects of a design's numbers on its closed-form metrics.
+    """Effects of a design's numbers on its metrics, of those that need no policy.
 
         >>> found = draft.sensitivity(draft.load("quadruped").resolve("bear"), of=["mass"])
         >>> i = found.names.index("actuators.leg.peak_torque")
@@ -145,11 +145,11 @@ def sensitivity(
 
     Raises:
         DraftError: the design is several, a name is unknown or given by an expression, a metric
-            needs a model or a policy, or the design has no number to change.
+            needs a policy, or the design has no number to change.
     """
     if design.count is not None:
         raise DraftError("sensitivities are of one design", "select one, such as `design[0]`")
-    metrics, numbers = closed_metrics(of), _chosen(design, by)
+    metrics, numbers = closed_metrics(of, models=True), _chosen(design, by)
     values = np.array(list(numbers.values()))
     steps = np.array([step_of(design, *one) for one in numbers.items()])
     moves = np.array([PER_CENT * values, -PER_CENT * values, steps, -steps])  # (4, P)
@@ -168,14 +168,13 @@ def sensitivity(
     arrays: dict[str, Value] = {name: rows[:, i] for i, name in enumerate(numbers)}
     judge = verdicts or reads_verdict(metrics)
     many = design.spec.resolve(design.values, arrays, errors=errors, judge=judge)
-    found = of_design(many, metrics)
-    table = np.array([np.broadcast_to(found[name], many.count or 1) for name in metrics], float)
+    table = _measured(many, metrics)
     base = table[:, 0]
     moved = table[:, 1:plain].reshape(len(metrics), kinds, count).transpose(1, 2, 0)
     drawn = table[:, plain:].reshape(len(metrics), 1 + count, samples)
     with np.errstate(all="ignore"):  # A time without a limit has no change.
         change = np.where(known[..., None], moved - base, np.nan)  # (4, P, M)
-        change = np.where(abs(change) <= _STILL * abs(base), 0.0, change)
+        change = np.where(abs(change) <= STILL * abs(base), 0.0, change)
         relative = change[:2] / abs(base)
         apart = drawn[:, 1:] - drawn[:, :1]
     ends = np.quantile(apart, _ENDS, axis=2).swapaxes(1, 2)
@@ -253,8 +252,28 @@ def _allowed(design: Design, names: Sequence[str], moved: Array) -> NDArray[np.b
     return allowed
 
 
-def closed_metrics(of: Sequence[str]) -> tuple[str, ...]:
+def _measured(many: Design, metrics: Sequence[str]) -> Array:
+    """Metrics of N designs, shape (M, N); those of models NaN for designs without one."""
+    count = many.count or 1
+    closed = [name for name in metrics if find(name).needs == "design"]
+    found: dict[str, Value] = dict(of_design(many, closed))
+    rest = [name for name in metrics if name not in found]
+    if rest:
+        from draft.model.batch import build_batch
+
+        batch = build_batch(many, np.flatnonzero(np.broadcast_to(many.accepted, count)))
+        for name, values in of_batch(batch, rest).items():
+            found[name] = np.full(count, np.nan)
+            found[name][batch.rows] = values
+    return np.array([np.broadcast_to(found[name], count) for name in metrics], float)
+
+
+def closed_metrics(of: Sequence[str], models: bool = False) -> tuple[str, ...]:
     """Metrics that need no model, all or those that are named.
+
+    Args:
+        of: names of metrics.
+        models: whether those of models that are built by arrays may be named too.
 
     Raises:
         DraftError: one is unknown, or needs a model or a policy.
@@ -264,8 +283,9 @@ def closed_metrics(of: Sequence[str]) -> tuple[str, ...]:
         return tuple(one.name for one in closed if one.unit != "bool")
     for name in of:
         metric = find(name)
-        if metric.needs != "design":
-            raise DraftError(needs_more(metric).cause, "omit it: sensitivities are of closed forms")
+        allowed = metric.needs == "design" or (models and metric.needs == "model" and metric.batch)
+        if not allowed:
+            raise DraftError(needs_more(metric).cause, "omit it: this takes closed forms")
     return tuple(dict.fromkeys(of))
 
 

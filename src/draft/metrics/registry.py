@@ -106,8 +106,14 @@ def metric(
 
 
 def reads_verdict(names: Iterable[str]) -> bool:
-    """Whether metrics may read the findings of the filter: masks, and those of extensions."""
-    return any(find(name).unit == "bool" or METRICS.origin(name) for name in names)
+    """Whether metrics may read the findings of the filter.
+
+    Masks may, those of models, which are built where it accepts, and those of extensions.
+    """
+    return any(
+        one.unit == "bool" or one.needs != "design" or bool(METRICS.origin(one.name))
+        for one in map(find, names)
+    )
 
 
 def unknown(name: str) -> Problem:
