@@ -114,13 +114,10 @@ class DesignComparison:
 
 def _limits(found: Sequence[Limit]) -> dict[str, Any]:
     """The limit that binds, the next one, and how far that is."""
-    first, following = found[0], found[1] if len(found) > 1 else None
-    margin = None if following is None else abs(following.value - first.value)
-    return {
-        **first._asdict(),
-        "next": None if following is None else following._asdict(),
-        "margin": margin,
-    }
+    first, *others = [one._asdict() | {"joints": list(one.joints)} for one in found[:2]]
+    after = others[0] if others else None
+    margin = None if after is None else abs(after["value"] - first["value"])
+    return {**first, "next": after, "margin": margin}
 
 
 def unique(names: Sequence[str]) -> tuple[str, ...]:
