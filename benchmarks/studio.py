@@ -22,6 +22,9 @@ from draft.studio.library import Library
 from draft.studio.server import Studio
 
 MOVES = 60
+EFFECT_ON = "jump_height"  # Of the metrics, the one that takes longest.
+EFFECTS = """[...document.querySelectorAll('label')].map((one) => one.textContent)
+  .filter((text) => /[▲▼]/.test(text)).join()"""
 SECONDS = 5.0  # of walking before the moves [s]
 # From a key press to the change of the mass, and to the end of the page's next frame [ms].
 WAIT = """(thumb) => new Promise((done) => {
@@ -64,6 +67,7 @@ def studio(robot: str) -> list[dict[str, Any]]:
                 time.sleep(3)
                 thumb = browser.slider(tab, "thigh_length")
                 times = [thumb.evaluate(WAIT) for _ in range(MOVES)][5:]
+                effects = _effects(tab)
                 walking = _walking(served, tab)
         finally:
             served.close()
@@ -74,7 +78,29 @@ def studio(robot: str) -> list[dict[str, Any]]:
         measured(f"{robot}: slider to numbers, median", numbers, "ms", 100.0),
         measured(f"{robot}: slider to picture and numbers, median", picture, "ms", 100.0),
         measured(f"{robot}: the same, 90 % of moves", _most([t for _, t in times]), "ms"),
+        measured(
+            f"{robot}: slider to effects of all sliders, median", _median(effects), "ms", 100.0
+        ),
+        measured(f"{robot}: the same, 90 % of moves", _most([t for _, t in effects]), "ms"),
     ]
+
+
+def _effects(tab: Any) -> list[list[float]]:
+    """Times of a slider's moves while all sliders show their effect on a metric [ms].
+
+    Effects and numbers come in one message.
+    """
+    tab.get_by_role("tab", name="Levers", exact=True).click()
+    browser.field(tab, "effect on").click()
+    tab.get_by_role("option", name=EFFECT_ON, exact=True).click()
+    tab.get_by_role("tab", name="Parameters", exact=True).click()
+    tab.wait_for_function(f"{EFFECTS} !== ''")
+    before = tab.evaluate(EFFECTS)
+    thumb = browser.slider(tab, "thigh_length")
+    times = [thumb.evaluate(WAIT) for _ in range(MOVES)][5:]
+    if tab.evaluate(EFFECTS) == before:
+        raise RuntimeError("the effects of the sliders stay as they were")
+    return times
 
 
 def _walking(served: Studio, tab: Any) -> tuple[list[list[float]], float] | None:
@@ -105,6 +131,11 @@ def _walking_rows(robot: str, times: list[list[float]], pace: float) -> list[dic
         measured(f"{robot} walking: slider to picture and numbers, median", picture, "ms", 100.0),
         measured(f"{robot} walking: the same, 90 % of moves", _most([t for _, t in times]), "ms"),
     ]
+
+
+def _median(times: list[list[float]]) -> float:
+    """Median time to picture and numbers [ms]."""
+    return statistics.median(picture for _, picture in times)
 
 
 def _most(times: list[float]) -> float:

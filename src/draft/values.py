@@ -47,6 +47,13 @@ def brief(value: Value) -> str:
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e7 else f"{value:.3g}"
 
 
+def signed(change: float) -> str:
+    """Text of a change with three digits, with its sign; "-" for NaN."""
+    if math.isnan(change):
+        return "-"
+    return f"{'+' if change > 0 else ''}{brief(change)}" if change else "0"
+
+
 def told_apart(before: float, after: float) -> tuple[str, str]:
     """Texts of two values, with as many digits as it takes to see which is larger."""
     for digits in range(3, 17):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +16,10 @@ import draft
 from draft.errors import DraftError
 from draft.explore import comparison
 from draft.explore.comparison import compare
+from draft.explore.comparison_tables import section
 from draft.metrics import of_design
+from draft.spec import Spec
+from draft.values import signed
 from tests.commands import Command
 
 QUADRUPED = draft.load("quadruped")
@@ -123,6 +128,75 @@ def test_one_design_and_several_in_one_are_refused(command: Command) -> None:
     with pytest.raises(DraftError, match="comparisons are of single designs"):
         draft.compare([CHEETAH, many])
     assert "two designs or more are compared" in command.refuses("compare cheetah")
+
+
+def test_what_limits_each_is_told_with_its_margin(command: Command) -> None:
+    record = command.json("compare cheetah bear --of payload_rated mass")["limits"]
+    own = record["quadruped:bear"]["payload_rated"]
+    assert (own["quantity"], own["actuator"]) == ("rated torque", "leg")
+    assert own["joints"] == ["FL_knee", "FR_knee", "RL_knee", "RR_knee"]
+    assert own["value"] == of_design(BEAR, ["payload_rated"])["payload_rated"]
+    assert own["margin"] == pytest.approx(own["next"]["value"] - own["value"])
+    assert "mass" not in record["quadruped:bear"]
+    said = command("compare cheetah hopper --of payload_rated").out
+    assert "what limits each" in said
+    assert re.search(r"payload_rated +hopper +12.7 kg +knee: rated torque", said)
+
+
+def test_designs_of_one_name_have_names_of_their_own() -> None:
+    low, high = (QUADRUPED.resolve({"thigh_length": x}) for x in (0.2, 0.3))
+    assert compare([low, high], ["mass"]).names == ("quadruped", "quadruped 2")
+    assert [*compare([low, high], ["mass"], names=("a", "b")).record()["designs"]] == ["a", "b"]
+
+
+def test_a_finding_that_both_have_with_other_numbers_is_none_of_one_alone() -> None:
+    strong, stronger = (
+        QUADRUPED.resolve("cheetah", {"actuators.leg.peak_torque": x}) for x in (5000.0, 5500.0)
+    )
+    assert compare([strong, stronger], ["mass"]).findings == ((), ())
+    alone = compare([CHEETAH, strong], ["mass"]).findings
+    assert alone[0] == ()
+    assert alone[1][0].startswith("error torque: ")
+
+
+def test_a_table_names_the_largest_shares() -> None:
+    longer = {"thigh_length": 0.3, "actuators.leg.peak_torque": 90.0, "trunk_height": 0.19}
+    found = compare([CHEETAH, QUADRUPED.resolve("cheetah", longer)], ["mass", "leg_length"])
+    mass, length = section(found, found.metrics).summary.rows
+    part = found.parts[0]
+    assert part is not None
+    share = dict(zip(part.names, part.shares[:, 0], strict=True))
+    two = sorted(share, key=lambda name: -abs(share[name]))[:2]
+    named = (f"{name.removeprefix('actuators.')} {signed(share[name])}" for name in two)
+    assert mass[-1] == ", ".join(named)
+    assert length[-2:] == ("", "thigh_length +0.05")
+
+
+def test_what_changes_by_rounding_alone_has_no_share() -> None:
+    humanoid = draft.load("humanoid")
+    longer = humanoid.resolve({"thigh_length": 0.21})
+    found = compare([humanoid.resolve(), longer], ["top_speed", "mass"])
+    part = found.parts[0]
+    assert part is not None
+    assert part.shares[0, 0] == 0.0
+    assert section(found, found.metrics).summary.rows[0][-1] == ""
+
+
+def test_where_no_robot_is_between_two_designs_there_is_no_share(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole, longer = Spec.resolve, QUADRUPED.resolve("cheetah", {"thigh_length": 0.3})
+
+    def resolve(self: Spec, *given: Any, **options: Any) -> draft.Design:
+        if isinstance(given[0], dict) and np.ndim(given[0].get("thigh_length", 0)):
+            raise draft.ResolveError("no robot", "choose another")
+        return whole(self, *given, **options)
+
+    monkeypatch.setattr(Spec, "resolve", resolve)
+    part = compare([CHEETAH, longer], ["mass"]).parts[0]
+    assert part is not None
+    assert np.isnan(part.shares).all()
+    assert part.better[0] < 0.01
 
 
 def test_json_has_all_metrics_and_no_infinity(command: Command) -> None:

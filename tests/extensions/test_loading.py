@@ -81,6 +81,21 @@ def test_a_metric_that_fails_is_left_out_of_a_run_that_names_none(
     assert not (tmp_path / "named").exists()
 
 
+def test_a_metric_that_fails_is_left_out_of_a_comparison_that_names_none(install: Install) -> None:
+    text = METRIC.format(name="fails", body="raise KeyError('x')")
+    install("ext_fails", text.replace("@metric(", "@metric(limits=lambda design: 1 / 0, "))
+    spec = draft.load("hopper")
+    designs = [spec.resolve(), spec.resolve({"thigh_length": 0.25})]
+    with pytest.warns(ExtensionWarning, match="the metric 'fails' of ext_fails fails"):
+        found = draft.compare(designs)
+    part = found.parts[0]
+    assert part is not None
+    assert part.shares[0, found.metrics.index("mass")] > 0
+    assert "fails" not in found.limits[0]
+    with pytest.raises(draft.DraftError, match="the metric 'fails' of ext_fails fails"):
+        draft.compare(designs, ["fails"])
+
+
 def test_of_two_extensions_with_one_name_the_second_is_left_out(install: Install) -> None:
     install("ext_a", METRIC.format(name="same", body="return 1.0"))
     install("ext_b", METRIC.format(name="own", body="1") + METRIC.format(name="same", body="2"))

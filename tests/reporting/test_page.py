@@ -14,11 +14,14 @@ import pytest
 
 import draft
 from draft.errors import DraftError
+from draft.explore.comparison import compare
+from draft.explore.comparison_tables import section
 from draft.metrics import METRICS, Metric
 from draft.reporting.page import page
 from draft.reporting.subjects import Subject, subjects
 from draft.reporting.tables import actuators, number
 from draft.values import scalar
+from tests.commands import Command
 from tests.helpers import parameter, robot
 
 pytest.importorskip("plotly")
@@ -121,6 +124,34 @@ def test_the_page_is_sound_the_same_every_time_and_loads_nothing(
     assert len(scales) == 1
 
 
+def test_the_comparison_is_that_of_the_command(
+    text: str, three: list[Subject], command: Command
+) -> None:
+    data = json.loads(read(text).scripts["draft-report"])["comparison"]
+    record = command.json("compare cheetah bear giraffe")
+    names = {one: one.partition(":")[2] for one in record["designs"]}
+    assert data["designs"] == {names[one]: row for one, row in record["designs"].items()}
+    for own, one in zip(data["against_first"], record["against_first"], strict=True):
+        assert own == one | {"design": names[one["design"]]}
+    assert [*data["limits"].values()] == [*record["limits"].values()]
+    assert [*data["findings_alone"].values()] == [*record["findings_alone"].values()]
+    shown = section(compare([one.design for one in three], names=[one.title for one in three]))
+    words = own_words(read(text))
+    for table in (shown.summary, shown.metrics, shown.limits, *shown.shares):
+        assert not isinstance(table, str)
+        for row in table.rows:
+            assert " ".join(cell for cell in row if cell) in words
+    assert all(line in words for line in shown.alone)
+
+
+def test_a_page_about_one_design_or_other_robots_compares_what_it_can() -> None:
+    spec = draft.load("quadruped")
+    one = page(subjects([spec.resolve()]))
+    assert 'id="comparison"' not in one
+    other = page(subjects([spec.resolve(), draft.load("hopper").resolve()]))
+    assert "another robot, so no number of one is one of the other" in other
+
+
 def _without_sources(data: Any) -> Any:
     """Data without the texts that name where a number is published."""
     if isinstance(data, dict):
@@ -184,14 +215,15 @@ def test_metrics_are_compared() -> None:
     spec = draft.load("quadruped")
     with patch.dict(METRICS._items, {one.name: one for one in made}, clear=True):
         found = subjects([spec.resolve("cheetah"), spec.resolve("bear")])
-        reader = read(page(found))
-    words = own_words(reader)
+        text = page(found)
+    words = own_words(read(text))
     assert "trunk mass" in words
     assert "yes" in words
     assert "nowhere" not in words
     assert "kg, lower is better" in words
-    assert words.count("seldom") == 1  # in the table: one value is no comparison
-    assert json.loads(reader.scripts["draft-report"])["metrics"]["cheetah"]["nowhere"] is None
+    metrics = text[text.index('<section id="metrics"') : text.index("</main>")]
+    assert metrics.count("seldom") == 1  # in the table: one value is no comparison
+    assert json.loads(read(text).scripts["draft-report"])["metrics"]["cheetah"]["nowhere"] is None
 
 
 @pytest.mark.parametrize(

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import json
+import re
+from html import escape
+
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import draft
 from draft.errors import DraftError
+from draft.explore.comparison_tables import section
 from draft.metrics import of_design
 from draft.studio.levers import Levers, between, effect_text, hold, to_target
 from draft.studio.library import Library
+from draft.studio.pinned_tab import comparison_card
+from draft.studio.report_page import report_page
 from draft.studio.session import Session
 from draft.values import scalar
 
@@ -44,6 +52,40 @@ def test_a_held_metric_stays_or_the_follower_is_at_an_end(length: float, name: s
         assert metric(after, name) == pytest.approx(metric(CHEETAH, name), rel=1e-4)
     else:
         assert value in (20.0, 300.0)  # The ends of its slider.
+
+
+def test_the_effects_of_sliders_need_no_verdict_and_are_those_of_the_command() -> None:
+    found = draft.sensitivity(CHEETAH, ["jump_height"])
+    quick = draft.sensitivity(CHEETAH, ["jump_height"], verdicts=False)
+    np.testing.assert_array_equal(quick.step_up, found.step_up)
+    assert quick.accepted.all()
+    effects = Levers(metric="accepted").effects(CHEETAH)  # A mask is judged all the same.
+    assert effects["trunk_length"] == ""
+    strong = draft.sensitivity(CHEETAH, ["accepted"], by=[TORQUE], verdicts=False)
+    judged = draft.sensitivity(CHEETAH, ["accepted"], by=[TORQUE])
+    np.testing.assert_array_equal(strong.step_up, judged.step_up)
+
+
+def test_the_card_of_a_pinned_design_has_the_numbers_of_the_comparison() -> None:
+    session = Session(Library(QUADRUPED))
+    session.pin()
+    pinned = session.shown
+    assert "Change the design" in comparison_card(pinned, pinned)
+    session.set_all({"thigh_length": 0.3, TORQUE: 90.0}, "both")
+    card = comparison_card(pinned, session.shown)
+    found = draft.compare([pinned.design, session.design], names=("pinned", "now"))
+    for name, _, before, now, odds, shares in section(found).summary.rows:
+        row = " ".join(re.sub(r"<[^>]+>", " ", card[card.index(f"<td>{name} ") :]).split())
+        assert f"{now} {before} {escape(odds)}" in row
+        assert shares in row
+    assert "knee: rated torque (leg)" in card
+    pytest.importorskip("plotly")
+    record = draft.compare([pinned.design, session.design]).record()["against_first"][0]
+    data = re.search(r'id="draft-report">(.+?)</script>', report_page(session))
+    assert data is not None
+    own = json.loads(data[1])["comparison"]["against_first"][0]
+    assert own["shares"] == record["shares"]
+    assert own["better"] == record["better"]
 
 
 def test_a_follower_that_ends_says_so() -> None:

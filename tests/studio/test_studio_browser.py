@@ -23,6 +23,7 @@ viser = pytest.importorskip("viser", reason="needs the extra 'view'")
 
 from PIL import Image  # noqa: E402
 
+from draft.explore.comparison_tables import section  # noqa: E402
 from draft.studio import panel  # noqa: E402
 from draft.studio.drop import HEIGHT, Drop  # noqa: E402
 from draft.studio.library import Library  # noqa: E402
@@ -244,6 +245,29 @@ def test_a_pinned_design_stays_as_a_ghost_and_a_limp_robot_falls(
     before = mass(tab)
     push(tab, "thigh_length", 2)
     until(lambda: mass(tab) != before)
+
+
+def test_a_pinned_design_has_a_tab_that_says_why_the_design_differs(
+    tab: Any, studio: Studio
+) -> None:
+    (shown, _), *_ = studio._panels.values()
+    press(tab, "Pin")
+    tab.get_by_role("tab", name="Pinned", exact=True).wait_for()
+    turn_to(tab, "Pinned")
+    tab.wait_for_selector("#ds-same")
+    push(tab, "thigh_length", 10)
+    tab.wait_for_selector("#ds-compared")
+    session = shown._session
+    until(lambda: session.design.parameters["thigh_length"] == pytest.approx(0.26))
+    designs = (session.pinned.design, session.design)
+    found = draft.compare(designs, ["mass", "jump_height"], names=("pinned", "now"))
+    for row in section(found, found.metrics).summary.rows:
+        for cell in row[2:]:
+            until(lambda cell=cell: cell in tab.inner_text("body"))
+    assert "knee: rated torque (leg)" in tab.inner_text("body")
+    picture(tab, "pinned_why")
+    press(tab, "Unpin")
+    until(lambda: tab.get_by_role("tab", name="Pinned", exact=True).count() == 0)
 
 
 # Sliders of which a person sees the thumb: nothing covers it, and it is inside the window.

@@ -36,7 +36,7 @@ COMMANDS = {
     "twin": "Compare a real robot with Draft's prediction of it.",
     "sensitivity": "Show what a change of each number of a design does to its metrics.",
     "solve": "Find the nearest design that meets conditions, and why each number moved.",
-    "compare": "Show designs side by side, and which changed number makes what difference.",
+    "compare": "Show designs side by side, which number makes what difference, and what limits.",
     "screen": "Screen very many designs by closed-form metrics and the filter, into one file.",
     "sweep": "Build very many designs and measure their models, into a folder of parts.",
     "optimise": "Search for the best designs with Optuna, and save them as named designs.",

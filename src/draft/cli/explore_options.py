@@ -20,6 +20,7 @@ from draft.design import Design
 from draft.design.references import find_design
 from draft.errors import counted
 from draft.explore.settings import Progress, Sampled, Varied
+from draft.metrics.registry import USUAL
 from draft.spec import Spec
 from draft.variation.axes import Range, ranges
 
@@ -32,6 +33,14 @@ Vary = Annotated[
         metavar="NAME=LOW:HIGH[:log] ...",
         help="Ranges, or NAME=A,B,C: thigh_length=0.2:0.7 actuators.leg.peak_torque=40:500:log.",
         help_behavior_hint="(required)",
+    ),
+]
+OfMetrics = Annotated[
+    tuple[str, ...],
+    tyro.conf.arg(
+        metavar="METRIC ...",
+        help="Metrics ('draft metrics' lists them), none that needs a policy.",
+        help_behavior_hint=f"(default: {', '.join(USUAL)})",
     ),
 ]
 PARTS_KEPT = f"the parts done so far are kept; {AGAIN}"

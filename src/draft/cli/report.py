@@ -43,7 +43,7 @@ def main(
     from draft.design.references import open_designs
     from draft.learn.policy.policy import open_policy
     from draft.reporting.report import write_report
-    from draft.reporting.subjects import subjects, table
+    from draft.reporting.subjects import comparison, subjects, table
 
     if policy and not walk:
         raise DraftError("--policy is for robots that walk", "add --walk")
@@ -51,7 +51,8 @@ def main(
         found = subjects(open_designs(designs), walk, [open_policy(file) for file in policy])
         paths = write_report(found, out, figures)
     if json:
-        print(json_.dumps(table(found) | {"out": [str(path) for path in paths]}, indent=2))
+        record = table(found, comparison(found)) | {"out": [str(path) for path in paths]}
+        print(json_.dumps(record, indent=2))
     else:
         print("\n".join(map(str, paths)))
         print(f"{counted(len(found), 'design')} in {time.perf_counter() - start:.1f} s")

@@ -16,14 +16,13 @@ from draft.cli.display.verdict import console, verdict
 from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
 from draft.errors import DraftError
 from draft.metrics import find
-from draft.values import brief
+from draft.metrics.registry import USUAL
+from draft.values import brief, signed
 
 if TYPE_CHECKING:
     from draft.design import Design
     from draft.explore.sensitivity import Sensitivity
 
-# Metrics that are printed unless some are named; the JSON has all.
-USUAL = ("mass", "payload_rated", "jump_height", "top_speed", "standing_power")
 _NUMBER, _CELL = 44, 28  # Width of the first columns of a table, and of a metric.
 
 
@@ -31,14 +30,7 @@ def main(
     reference: DesignArgument,
     /,
     *,
-    of: Annotated[
-        tuple[str, ...],
-        tyro.conf.arg(
-            metavar="METRIC ...",
-            help="Metrics, of those that need no policy ('draft metrics' lists them).",
-            help_behavior_hint=f"(default: {', '.join(USUAL)})",
-        ),
-    ] = (),
+    of: x.OfMetrics = (),
     by: Annotated[
         tuple[str, ...],
         tyro.conf.arg(
@@ -203,13 +195,6 @@ def _cell(found: Sensitivity, i: int, k: int) -> str:
         text += f" ({signed(low)}..{signed(high)})"
     percent = found.up[i, k]
     return f"{text}\n{100 * percent:+.2g} %" if percent and not math.isnan(percent) else text
-
-
-def signed(change: float) -> str:
-    """Text of a change, with its sign."""
-    if math.isnan(change):
-        return "-"
-    return f"{'+' if change > 0 else ''}{brief(change)}" if change else "0"
 
 
 def _short(name: str) -> str:

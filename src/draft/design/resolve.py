@@ -46,6 +46,7 @@ def resolve(
     label: str = "custom",
     places: Mapping[str, Location] | None = None,
     errors: LawErrors | None = None,
+    judge: bool = True,
 ) -> Design:
     """Evaluate every number of a spec; see `Spec.resolve`.
 
@@ -54,7 +55,7 @@ def resolve(
     p = plan(spec)
     table = read_table(spec, values, places or {}, p.order)
     with np.errstate(all="ignore"):
-        return _Resolver(spec, p, table, errors).run(label, values)
+        return _Resolver(spec, p, table, errors).run(label, values, judge)
 
 
 def trunk_by_law(design: Design) -> TrunkPart:
@@ -109,7 +110,7 @@ class _Resolver:
         self.r = Evaluator(self.env)
         self.actuators: dict[str, Actuator] = {}
 
-    def run(self, label: str, values: Mapping[str, Value | str | None]) -> Design:
+    def run(self, label: str, values: Mapping[str, Value | str | None], judge: bool) -> Design:
         spec, p = self.spec, self.plan
         for name in self.table.order:
             if name.endswith("."):
@@ -151,6 +152,8 @@ class _Resolver:
         )
         design = replace(design, trunk=_erring(trunk_by_law(design), self.errors.trunk))
         design = replace(design, trunk=trunk_with_battery(design))
+        if not judge:
+            return design
         judged = replace(design, findings=inspect(design, p, self.r.invalid))
         hand_on(design, judged)
         return judged

@@ -1,4 +1,4 @@
-"""Why designs differ: their metrics side by side, and what each changed number contributes.
+"""Why designs differ: metrics side by side, what each changed number contributes, what limits.
 
 A difference between two designs of one robot is divided over the numbers that differ by Shapley
 values: the mean effect of a number over all orders in which the numbers may be changed (Shapley
@@ -12,22 +12,27 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.design import Design
+from draft.design import Design, Finding
 from draft.design.error_samples import sample_errors
-from draft.errors import DraftError
-from draft.explore.sensitivity import STILL, stated_numbers
-from draft.metrics import METRICS, find, of_design
+from draft.design.findings import grouped
+from draft.errors import DraftError, ResolveError
+from draft.explore.sensitivity import STILL, closed_metrics, stated_numbers
+from draft.metrics import Limit, find, limits, of_design
+from draft.metrics.registry import reads_verdict
 from draft.spec.payload import MASS
 from draft.values import Array, Value, scalar
 
 EXACT = 10  # Numbers whose orders are all counted.
 SAMPLES, ORDERS = 2000, 200
+_ROUNDING = 1e-12  # Share of a metric's value that is rounding.
 Setting = Value | str | None
+Measure = Callable[[Design], Mapping[str, Value]]
 _MISSING = object()  # A design does not state the number.
 
 
@@ -58,17 +63,21 @@ class DesignComparison:
 
     Attributes:
         designs: the designs; the others are compared with the first.
+        names: their names, each another.
         metrics: names of the closed-form metrics.
         values: shape (designs, metrics).
         parts: for each other design why it differs; None for another robot.
-        findings: messages of the filter that not all designs have, for each design.
+        findings: findings of the filter that not all designs have, for each design.
+        limits: what limits each design by metric, the limit that binds first (`metrics.limits`).
     """
 
     designs: tuple[Design, ...]
+    names: tuple[str, ...]
     metrics: tuple[str, ...]
     values: Array
     parts: tuple[Part | None, ...]
     findings: tuple[tuple[str, ...], ...]
+    limits: tuple[Mapping[str, tuple[Limit, ...]], ...]
 
     def record(self) -> dict[str, Any]:
         """Plain data; None where there is no number."""
@@ -78,33 +87,59 @@ class DesignComparison:
             return dict(zip(self.metrics, known, strict=True))
 
         others = []
-        for design, part in zip(self.designs[1:], self.parts, strict=True):
-            record: dict[str, Any] = {"design": design.reference, "same_robot": part is not None}
+        for name, part in zip(self.names[1:], self.parts, strict=True):
+            record: dict[str, Any] = {"design": name, "same_robot": part is not None}
             if part is not None:
                 record["better"] = row(part.better)
                 record["exact"] = part.exact
                 record["shares"] = {
-                    name: {"from": part.before[i], "to": part.after[i], **row(part.shares[i])}
-                    for i, name in enumerate(part.names)
+                    number: {"from": part.before[i], "to": part.after[i], **row(part.shares[i])}
+                    for i, number in enumerate(part.names)
                 }
             others.append(record)
         return {
             "designs": {
-                one.reference: row(values)
-                for one, values in zip(self.designs, self.values, strict=True)
+                name: row(values) for name, values in zip(self.names, self.values, strict=True)
             },
             "against_first": others,
+            "limits": {
+                name: {metric: _limits(found) for metric, found in own.items()}
+                for name, own in zip(self.names, self.limits, strict=True)
+            },
             "findings_alone": {
-                one.reference: list(own)
-                for one, own in zip(self.designs, self.findings, strict=True)
+                name: list(own) for name, own in zip(self.names, self.findings, strict=True)
             },
         }
 
 
+def _limits(found: Sequence[Limit]) -> dict[str, Any]:
+    """The limit that binds, the next one, and how far that is."""
+    first, *others = [one._asdict() | {"joints": list(one.joints)} for one in found[:2]]
+    after = others[0] if others else None
+    margin = None if after is None else abs(after["value"] - first["value"])
+    return {**first, "next": after, "margin": margin}
+
+
+def unique(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of which a later one that is there already has a number."""
+    found: list[str] = []
+    for name in names:
+        number, made = 2, name
+        while made in found:
+            number, made = number + 1, f"{name} {number}"
+        found.append(made)
+    return tuple(found)
+
+
 def compare(
-    designs: Sequence[Design], of: Sequence[str] = (), *, seed: int = 0, samples: int = SAMPLES
+    designs: Sequence[Design],
+    of: Sequence[str] = (),
+    *,
+    names: Sequence[str] = (),
+    seed: int = 0,
+    samples: int = SAMPLES,
 ) -> DesignComparison:
-    """Compare designs by their closed-form metrics, and say why they differ.
+    """Compare designs by their closed-form metrics, and say why they differ and what limits each.
 
         >>> spec = draft.load("quadruped")
         >>> found = draft.compare([spec.resolve("cheetah"), spec.resolve("bear")], ["mass"])
@@ -115,6 +150,7 @@ def compare(
     Args:
         designs: two single designs or more.
         of: metrics; empty for all that need no model.
+        names: names of the designs; empty for their references.
         seed: seed of the samples.
         samples: samples of the errors of the laws.
 
@@ -125,20 +161,38 @@ def compare(
         raise DraftError("there is nothing to compare", "give two designs or more")
     if any(one.count is not None for one in designs):
         raise DraftError("comparisons are of single designs", "select one, such as `design[0]`")
-    names = tuple(of) or tuple(
-        one.name for one in METRICS.values() if one.needs == "design" and one.unit != "bool"
-    )
-    table = [of_design(one, names) for one in designs]
-    values = np.array([[scalar(row[name]) for name in names] for row in table])
+    metrics = closed_metrics(of)
+    # A metric of an extension that fails is NaN unless it is named.
+    measure = partial(of_design, names=metrics if of else None)
+    table = [measure(one) for one in designs]
+    values = np.array([[scalar(row[name]) for name in metrics] for row in table])
     first, *others = designs
     parts = tuple(
-        _part(first, other, names, seed, samples) if _same_robot(first, other) else None
+        _part(first, other, metrics, measure, seed, samples) if _same_robot(first, other) else None
         for other in others
     )
-    messages = [{f"{f.id}: {f.message}" for f in one.findings} for one in designs]
-    shared = set.intersection(*messages)
-    findings = tuple(tuple(sorted(own - shared)) for own in messages)
-    return DesignComparison(tuple(designs), names, values, parts, findings)
+    shared = set.intersection(*({_kind(f) for f in one.findings} for one in designs))
+    findings = tuple(
+        tuple(
+            f"{f.severity} {f.id}: {f.message}"
+            for f in grouped(f for f in one.findings if _kind(f) not in shared)
+        )
+        for one in designs
+    )
+    return DesignComparison(
+        designs=tuple(designs),
+        names=unique(names or [one.reference for one in designs]),
+        metrics=metrics,
+        values=values,
+        parts=parts,
+        findings=findings,
+        limits=tuple(limits(one, of) for one in designs),
+    )
+
+
+def _kind(finding: Finding) -> tuple[str, ...]:
+    """What two designs have in common that have a finding alike, with other numbers."""
+    return finding.severity, finding.id, finding.where
 
 
 def _same_robot(a: Design, b: Design) -> bool:
@@ -146,10 +200,13 @@ def _same_robot(a: Design, b: Design) -> bool:
     return a.spec is b.spec or (a.spec.name, a.spec.folder) == (b.spec.name, b.spec.folder)
 
 
-def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: int) -> Part:
+def _part(
+    a: Design, b: Design, metrics: tuple[str, ...], measure: Measure, seed: int, samples: int
+) -> Part:
     before, after = _differing(a, b)
     names = tuple(before)
     spec = a.spec if "payload" in a.spec.parameters else b.spec
+    judge = reads_verdict(metrics)
     base = {key: value for key, value in {**b.values, **a.values}.items() if key not in before}
     numeric = [i for i, n in enumerate(names) if _real(before[n]) and _real(after[n])]
     others = [i for i in range(len(names)) if i not in numeric]
@@ -166,7 +223,10 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
                     given[names[i]] = setting
             for i in numeric:
                 given[names[i]] = np.where(chosen[rows, i], after[names[i]], before[names[i]])
-            row = of_design(spec.resolve(given), metrics)
+            try:
+                row = measure(spec.resolve(given, judge=judge))
+            except ResolveError:
+                continue  # No robot between the two has these settings.
             for k, name in enumerate(metrics):
                 found[rows, k] = row[name]
         return found
@@ -174,8 +234,11 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
     exact = len(names) <= EXACT
     with np.errstate(invalid="ignore"):  # A time without a limit has no difference.
         shares = _shapley(len(names), measured, seed, exact)
-        shares[abs(shares) <= STILL * abs(shares).max(axis=0, initial=0.0)] = 0.0
-        better = _better(a, b, metrics, seed, samples)
+        better = _better(a, b, metrics, measure, seed, samples)
+        ends = measured(np.array([[False], [True]]).repeat(len(names), axis=1))
+        rounding = np.where(abs(ends) < math.inf, _ROUNDING * abs(ends), 0.0).max(axis=0)
+        least = np.fmax(STILL * abs(shares).max(axis=0, initial=0.0), rounding)
+        shares[abs(shares) <= least] = 0.0
     texts = [tuple(_text(of[name]) for name in names) for of in (before, after)]
     return Part(names, texts[0], texts[1], shares, better, exact)
 
@@ -248,12 +311,13 @@ def _shapley(
     return shares / ORDERS
 
 
-def _better(a: Design, b: Design, metrics: Sequence[str], seed: int, samples: int) -> Array:
+def _better(
+    a: Design, b: Design, metrics: Sequence[str], measure: Measure, seed: int, samples: int
+) -> Array:
     """Probability that the other design is better in each metric, shape (metrics,)."""
     errors = sample_errors(a, samples, seed, b)
-    rows: list[Mapping[str, Value]] = [
-        of_design(one.spec.resolve(one.values, errors=errors), metrics) for one in (a, b)
-    ]
+    judge = reads_verdict(metrics)
+    rows = [measure(one.spec.resolve(one.values, errors=errors, judge=judge)) for one in (a, b)]
     found = np.full(len(metrics), np.nan)
     for k, name in enumerate(metrics):
         direction = find(name).better

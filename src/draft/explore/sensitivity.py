@@ -20,6 +20,7 @@ from draft.design.error_samples import sample_errors
 from draft.errors import DraftError, suggest
 from draft.metrics import METRICS, find, of_design
 from draft.metrics.measure import needs_more, of_batch
+from draft.metrics.registry import reads_verdict
 from draft.spec.check import key_problem
 from draft.spec.payload import with_payload
 from draft.values import Array, Value, scalar
@@ -123,6 +124,7 @@ def sensitivity(
     *,
     samples: int = SAMPLES,
     seed: int = 0,
+    verdicts: bool = True,
 ) -> Sensitivity:
     """Effects of a design's numbers on its metrics, of those that need no policy.
 
@@ -138,6 +140,8 @@ def sensitivity(
             empty for all that the design states as numbers.
         samples: samples of the errors of the laws.
         seed: seed of the samples.
+        verdicts: whether to run the filter on each design, which takes most of the time; without
+            it all have the verdict of the design.
 
     Raises:
         DraftError: the design is several, a name is unknown or given by an expression, a metric
@@ -162,7 +166,8 @@ def sensitivity(
         rows[start : start + samples, i] += steps[i] if known[2, i] else 0.0
     errors = sample_errors(design, samples, seed).repeated(1 + count).after(plain)
     arrays: dict[str, Value] = {name: rows[:, i] for i, name in enumerate(numbers)}
-    many = design.spec.resolve(design.values, arrays, errors=errors)
+    judge = verdicts or reads_verdict(metrics)
+    many = design.spec.resolve(design.values, arrays, errors=errors, judge=judge)
     table = _measured(many, metrics)
     base = table[:, 0]
     moved = table[:, 1:plain].reshape(len(metrics), kinds, count).transpose(1, 2, 0)
@@ -174,7 +179,7 @@ def sensitivity(
         apart = drawn[:, 1:] - drawn[:, :1]
     ends = np.quantile(apart, _ENDS, axis=2).swapaxes(1, 2)
     low, high = np.where(known[2][:, None], ends, np.nan)
-    accepted = np.broadcast_to(many.accepted, many.count or 1)
+    accepted = np.broadcast_to((many if verdicts else design).accepted, many.count or 1)
     less, more = (accepted[1 + k * count + own] for k in (3, 2))
     return Sensitivity(
         design=design,

@@ -25,12 +25,14 @@ __all__ = [
     "LEARNED",
     "METRICS",
     "Carry",
+    "Limit",
     "Metric",
     "Overload",
     "Payload",
     "Travel",
     "carry",
     "find",
+    "limits",
     "metric",
     "of_batch",
     "of_design",
@@ -59,4 +61,5 @@ for _module in sorted((found.name for found in iter_modules(__path__)), key=_ord
 # Modules register their metrics in the order above, so no function may be imported before.
 from draft.metrics.energy import Travel, travel  # noqa: E402
 from draft.metrics.heat import Carry, Payload, carry, payload_for  # noqa: E402
+from draft.metrics.limiting import Limit, limits  # noqa: E402
 from draft.metrics.statics import Overload, overload  # noqa: E402

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from draft import geometry as g
 from draft.design import Design
 from draft.design.battery import battery
 from draft.design.electronics import electronics
 from draft.design.legs import GRAVITY
+from draft.design.loads import LegLoad, loads
 from draft.errors import DraftError
+from draft.metrics.limiting import Limit, shared_end
 from draft.metrics.registry import metric
-from draft.metrics.statics import cost_of_standing
-from draft.values import Value, divide
+from draft.metrics.statics import cost_of_standing, heat
+from draft.values import Value, divide, scalar
 
 JOULES_PER_WATT_HOUR = 3600.0
 
@@ -34,11 +38,27 @@ def standing_power(design: Design) -> Value:
     return electronics(design).power + cost_of_standing(design) * design.mass
 
 
+def _endurance_limits(design: Design) -> Iterator[Limit]:
+    """Time for which the battery would supply each consumer alone."""
+    energy = battery(design).energy
+    if loads(design):
+        idle = divide(energy, electronics(design).power)
+        yield Limit(scalar(idle), "power of the electronics")
+    alike: dict[tuple[str, str], list[LegLoad]] = {}
+    for x in loads(design):
+        alike.setdefault((x.actuator.name, shared_end(x.joint.names)), []).append(x)
+    for (actuator, _), own in alike.items():
+        hours = scalar(divide(energy, g.total(map(heat, own))))
+        joints = tuple(name for x in own for name in x.joint.names)
+        yield Limit(hours, "heat of the motors", joints, actuator)
+
+
 @metric(
     unit="h",
     formula="energy of the battery / standing_power",
     source="energy of surveyed batteries, docs/limits.md; power as standing_power",
     better="more",
+    limits=_endurance_limits,
 )
 def endurance_standing(design: Design) -> Value:
     """Time that the battery lasts while the robot stands in the crouch [h].

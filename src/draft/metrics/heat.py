@@ -16,7 +16,7 @@ from draft.errors import DraftError
 from draft.laws import limits
 from draft.metrics.registry import metric
 from draft.metrics.speed import top_speed
-from draft.metrics.statics import payload_at, standing_torque_rated
+from draft.metrics.statics import payload_at, payload_limits, standing_torque_rated
 from draft.metrics.walking import DUTY, joint_rate, stance_torque, swing_torque
 from draft.values import Mask, Value, divide, exp, maximum, sqrt, where
 
@@ -35,6 +35,7 @@ HOUR = 3600.0
     f"{limits.torque_for(HOUR):.3f}",
     source=_OVERLOAD,
     better="more",
+    limits=payload_limits(limits.torque_for(HOUR)),
 )
 def payload_hour(design: Design) -> Value:
     """Mass on the trunk that the robot can hold in the crouch for an hour [kg].

@@ -14,6 +14,7 @@ moves with the trunk), friction, and the limits of battery and current.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from draft.design import Design
@@ -21,6 +22,7 @@ from draft.design.actuators import Actuator
 from draft.design.cached import once
 from draft.design.crouch import bend_at
 from draft.design.legs import GRAVITY, Leg, count, legs
+from draft.metrics.limiting import Limit, at_joint
 from draft.metrics.registry import metric
 from draft.values import Value, both, clip, cos, divide, maximum, minimum, sin, sqrt, where
 
@@ -49,15 +51,26 @@ def push_off_of(design: Design, mass: Value) -> PushOff:
         design: one design, or N.
         mass: mass that is moved [kg].
     """
-    n = count(design)
-    found = [
-        _push_off(leg, leg.knee.actuator, mass / n)
+    found = _of_each(design, mass)
+    if not found or len(found) < len(legs(design)):
+        return PushOff(math.nan, math.nan)
+    return PushOff(minimum(*(f.height for _, f in found)), minimum(*(f.power for _, f in found)))
+
+
+def _of_each(design: Design, mass: Value) -> list[tuple[Leg, PushOff]]:
+    """Push-off of each kind of leg whose knee is driven, with its share of the mass."""
+    share = mass / count(design) if legs(design) else mass
+    return [
+        (leg, _push_off(leg, leg.knee.actuator, share))
         for leg in legs(design)
         if leg.knee.actuator is not None
     ]
-    if not found or len(found) < len(legs(design)):
-        return PushOff(math.nan, math.nan)
-    return PushOff(minimum(*(f.height for f in found)), minimum(*(f.power for f in found)))
+
+
+def _limits(design: Design) -> Iterator[Limit]:
+    for leg, found in _of_each(design, design.mass):
+        if leg.knee.actuator is not None:
+            yield at_joint(leg.knee, leg.knee.actuator, "torque-speed line", found.height)
 
 
 @metric(
@@ -66,6 +79,7 @@ def push_off_of(design: Design, mass: Value) -> PushOff:
     "at the knees",
     source="energy balance over the knees' bend; torque-speed line as in arXiv 2609.38405",
     better="more",
+    limits=_limits,
 )
 def jump_height(design: Design) -> Value:
     """Rise of the trunk above standing straight, from a squat of L / 2 [m].

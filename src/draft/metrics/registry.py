@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from draft.errors import DraftError, Problem, suggest
 from draft.extensions import Registry
+
+if TYPE_CHECKING:
+    from draft.metrics.limiting import Limit
 
 Better = Literal["less", "more", ""]
 Needs = Literal["design", "model", "policy"]
@@ -32,6 +35,7 @@ class Metric:
             a Model to a float.
         batch: whether a function of a Model also takes a ModelBatch and returns an array of shape
             (models,); otherwise models are built one by one.
+        limits: function from one Design to what limits the metric; None if nothing is named.
     """
 
     name: str
@@ -43,11 +47,14 @@ class Metric:
     needs: Needs
     function: Callable[[Any], Any]
     batch: bool = False
+    limits: Callable[[Any], Iterable[Limit]] | None = None
 
 
 METRICS: Registry[Metric] = Registry("metric")
 # Those that need a policy, see `draft.metrics.learned`.
 LEARNED: dict[str, Metric] = {}
+# Those that are shown unless some are named.
+USUAL = ("mass", "payload_rated", "jump_height", "top_speed", "standing_power")
 # Names that metrics had before, and what to use instead.
 RENAMED = {
     "payload": "use payload_peak for the same number, at peak torque, or payload_rated for what "
@@ -63,6 +70,7 @@ def metric(
     better: Better = "",
     needs: Needs = "design",
     batch: bool = False,
+    limits: Callable[[Any], Iterable[Limit]] | None = None,
 ) -> Callable[[F], F]:
     """Register a function as a metric and return it unchanged.
 
@@ -80,6 +88,7 @@ def metric(
         better: direction that is better; "" for neither.
         needs: "design" for a function of a Design, "model" for one of a Model.
         batch: whether a function of a Model also takes a ModelBatch.
+        limits: function from one Design to what limits it (`draft.metrics.limits`).
 
     Raises:
         DraftError: a metric of this name exists already.
@@ -89,11 +98,22 @@ def metric(
         name = function.__name__
         line = (inspect.getdoc(function) or "").partition("\n")[0]
         sentence = line.removesuffix(f" [{unit}].").removesuffix(".") + "."
-        made = Metric(name, unit, sentence, formula, source, better, needs, function, batch)
+        made = Metric(name, unit, sentence, formula, source, better, needs, function, batch, limits)
         METRICS.add(name, made, function.__module__)
         return function
 
     return register
+
+
+def reads_verdict(names: Iterable[str]) -> bool:
+    """Whether metrics may read the findings of the filter.
+
+    Masks may, those of models, which are built where it accepts, and those of extensions.
+    """
+    return any(
+        one.unit == "bool" or one.needs != "design" or bool(METRICS.origin(one.name))
+        for one in map(find, names)
+    )
 
 
 def unknown(name: str) -> Problem:

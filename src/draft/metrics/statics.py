@@ -6,7 +6,7 @@ Unless another pose is named the robot is in the crouch.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,8 @@ import numpy as np
 from draft import geometry as g
 from draft.design import Design
 from draft.design.legs import GRAVITY
-from draft.design.loads import home_loads, loads
+from draft.design.loads import LegLoad, Load, home_loads, loads
+from draft.metrics.limiting import Limit, at_joint
 from draft.metrics.registry import metric
 from draft.values import Value, divide, maximum, minimum, scalar, where
 
@@ -37,15 +38,36 @@ def joint_margins(design: Design) -> dict[str, Value]:
     return margins
 
 
+def _margin_limits(design: Design) -> Iterator[Limit]:
+    for x in loads(design):
+        yield at_joint(x.joint, x.actuator, "peak torque", _margin(x))
+
+
+def _margin(load: Load) -> Value:
+    """Peak torque over the torque that holds the robot [1]."""
+    return divide(load.actuator.peak_torque, abs(load.torque))
+
+
 @metric(
     unit="1",
     formula="min of tau_peak / |sum m g dz/dq - (M g / n) dz_foot/dq| in the crouch",
     source=_STATICS,
     better="more",
+    limits=_margin_limits,
 )
 def torque_margin(design: Design) -> Value:
     """Smallest ratio of peak torque to standing torque of the joints of the legs [1]."""
-    return _least(divide(x.actuator.peak_torque, abs(x.torque)) for x in loads(design))
+    return _least(map(_margin, loads(design)))
+
+
+def _standing_limits(design: Design) -> Iterator[Limit]:
+    for x in home_loads(design):
+        yield at_joint(x.joint, x.actuator, "rated torque", _rated_share(x))
+
+
+def _rated_share(load: Load) -> Value:
+    """Torque that holds the robot over the rated torque [1]."""
+    return divide(abs(load.torque), load.actuator.rated_torque)
 
 
 @metric(
@@ -53,11 +75,24 @@ def torque_margin(design: Design) -> Value:
     formula="max of |sum m g dz/dq - (M g / n) dz_foot/dq| / tau_rated in the home pose",
     source=_STATICS,
     better="less",
+    limits=_standing_limits,
 )
 def standing_torque_rated(design: Design) -> Value:
     """Largest share of its rated torque that a joint of the legs needs in the home pose [1]."""
-    shares = [divide(abs(x.torque), x.actuator.rated_torque) for x in home_loads(design)]
+    shares = [_rated_share(x) for x in home_loads(design)]
     return maximum(*shares) if shares else math.nan
+
+
+def payload_limits(share: float) -> Callable[[Design], Iterator[Limit]]:
+    """What limits `payload_at` a share of the rated torque [1], of one design."""
+
+    def found(design: Design) -> Iterator[Limit]:
+        for x in loads(design):
+            rated = share * scalar(x.actuator.rated_torque) <= scalar(x.actuator.peak_torque)
+            quantity = "rated torque" if rated else "peak torque"
+            yield at_joint(x.joint, x.actuator, quantity, _payload(x, share))
+
+    return found
 
 
 @metric(
@@ -65,6 +100,7 @@ def standing_torque_rated(design: Design) -> Value:
     formula="min of (tau_rated - tau sign) / |(g / n) dz_foot/dq| in the crouch",
     source=_STATICS,
     better="more",
+    limits=payload_limits(1.0),
 )
 def payload_rated(design: Design) -> Value:
     """Mass on the trunk at which the first joint reaches its rated torque [kg].
@@ -82,6 +118,7 @@ def payload_rated(design: Design) -> Value:
     formula="min of (tau_peak - tau sign) / |(g / n) dz_foot/dq| in the crouch",
     source=_STATICS,
     better="more",
+    limits=payload_limits(math.inf),
 )
 def payload_peak(design: Design) -> Value:
     """Mass on the trunk at which the first joint reaches its peak torque [kg].
@@ -127,13 +164,15 @@ def payload_at(design: Design, share: Value) -> Value:
         design: one design, or N.
         share: torque over rated torque [1]; the peak torque limits it.
     """
-    return _least(
-        divide(
-            minimum(x.actuator.peak_torque, share * x.actuator.rated_torque)
-            - where(x.per_mass < 0, -1.0 * x.torque, x.torque),
-            abs(x.per_mass),
-        )
-        for x in loads(design)
+    return _least(_payload(x, share) for x in loads(design))
+
+
+def _payload(load: Load, share: Value) -> Value:
+    """Mass on the trunk at which one joint reaches a share of its rated torque [kg]."""
+    return divide(
+        minimum(load.actuator.peak_torque, share * load.actuator.rated_torque)
+        - where(load.per_mass < 0, -1.0 * load.torque, load.torque),
+        abs(load.per_mass),
     )
 
 
@@ -186,10 +225,14 @@ def cost_of_standing(design: Design) -> Value:
     found = loads(design)
     if not found:
         return math.nan
-    losses = (x.leg.copies * x.torque * x.torque * x.actuator.copper_loss for x in found)
-    return g.total(losses) / design.mass
+    return g.total(map(heat, found)) / design.mass
 
 
-def _least(values: Iterator[Value]) -> Value:
+def heat(load: LegLoad) -> Value:
+    """Copper loss of a joint on all legs of its kind in the crouch [W]."""
+    return load.leg.copies * load.torque * load.torque * load.actuator.copper_loss
+
+
+def _least(values: Iterable[Value]) -> Value:
     found = list(values)
     return minimum(*found) if found else math.nan

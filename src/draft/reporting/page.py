@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import partial
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
+from draft.explore.comparison_tables import section as comparison_section
 from draft.extras import missing, own_version
 from draft.reporting import dots, motion, plots, scene3d, tables, torque_speed
-from draft.reporting.subjects import Subject, table
+from draft.reporting.subjects import Subject, comparison, table
 from draft.reporting.tables import Html, text
 from draft.webpage import webpage
 
 if TYPE_CHECKING:
+    from draft.explore.comparison import DesignComparison
     from draft.learn.policy.gait import Gait
 
 
@@ -27,17 +30,18 @@ def page(subjects: Sequence[Subject]) -> str:
     """
     library = plotly()
     figures: dict[str, Any] = {}
-    sections = [
-        section
-        for make in (_robots, _overview, _masses, _actuators, _findings, _metrics, _parameters)
-        if (section := make(subjects, figures))
-    ]
+    compared = comparison(subjects)
+    makers = (
+        *(_robots, _overview, partial(_comparison, compared), _masses, _actuators),
+        *(_findings, _metrics, _parameters),
+    )
+    sections = [section for make in makers if (section := make(subjects, figures))]
     title = _title(subjects)
     body = "\n".join(
         [
             _header(subjects, title),
             f"<main>{''.join(sections)}</main>",
-            _json("draft-report", table(subjects)),
+            _json("draft-report", table(subjects, compared)),
             _json("draft-figures", figures),
         ]
     )
@@ -140,6 +144,30 @@ def _walk(gait: Gait) -> str:
 
 def _overview(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
     return _section("overview", "Overview", tables.overview(subjects))
+
+
+def _comparison(
+    compared: DesignComparison | None, subjects: Sequence[Subject], figures: dict[str, Any]
+) -> str:
+    """Why the designs differ, and what limits each."""
+    if compared is None:
+        return ""
+    found = comparison_section(compared)
+    shares = [
+        f"<p>{text(one)}</p>" if isinstance(one, str) else tables.plain(one) for one in found.shares
+    ]
+    if len(shares) > 1:
+        shares = [_details("Shares of the numbers that differ", Html("".join(shares)))]
+    alone = "".join(f"<li>{text(line)}</li>" for line in found.alone)
+    return _section(
+        "comparison",
+        "Comparison",
+        tables.plain(found.summary, "words"),
+        *shares,
+        tables.plain(found.limits, "words") if found.limits.rows else "",
+        f"<ul>{alone}</ul>" if alone else "",
+        _details("All metrics, with these probabilities", tables.plain(found.metrics)),
+    )
 
 
 def _masses(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from draft.design import Design
 from draft.design.report import report
 from draft.errors import DraftError, ModelError
+from draft.explore.comparison import DesignComparison, compare, unique
 from draft.metrics import of_design, of_model
 from draft.model import Model
 from draft.model.model import preview
@@ -89,9 +90,16 @@ def _preview(design: Design) -> Model | None:
         return None
 
 
-def table(found: Sequence[Subject]) -> dict[str, Any]:
-    """Reports and metrics of the designs by title, as plain data; NaN becomes None."""
+def comparison(found: Sequence[Subject]) -> DesignComparison | None:
+    """Comparison of the designs with the first; None for a single one."""
+    names = [one.title for one in found]
+    return compare([one.design for one in found], names=names) if len(found) > 1 else None
+
+
+def table(found: Sequence[Subject], compared: DesignComparison | None) -> dict[str, Any]:
+    """Reports and metrics of the designs by title, and their comparison; NaN becomes None."""
     return {
+        **({} if compared is None else {"comparison": compared.record()}),
         "designs": {one.title: one.record for one in found},
         "metrics": {
             one.title: {n: v if math.isfinite(v) else None for n, v in one.metrics.items()}
@@ -110,9 +118,6 @@ def _titles(designs: Sequence[Design]) -> list[str]:
             title = label or (design.name if len(designs) == 1 else "default")
         else:
             title = f"{design.name} {label}".strip()
-        # The design files of all saved models have the same name, `design`.
-        number, base = 2, title
-        while title in titles:
-            title, number = f"{base} {number}", number + 1
         titles.append(title)
-    return titles
+    # The design files of all saved models have the same name, `design`.
+    return list(unique(titles))

@@ -11,6 +11,7 @@ from draft.design.bands import actuator_bands
 from draft.design.findings import grouped
 from draft.design.report import actuator_rows
 from draft.design.widened import band
+from draft.explore.comparison_tables import TextTable
 from draft.laws.actuators import Laws
 from draft.metrics import METRICS
 from draft.model.picture import corners
@@ -67,6 +68,20 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") ->
         f'<div class="scroll"><table class="{kind}"><thead><tr>{top}</tr></thead>\n'
         f"<tbody>{found}</tbody></table></div>"
     )
+
+
+def plain(of: TextTable, kind: str = "") -> Html:
+    """Return a table of text, with its title and note.
+
+    Args:
+        of: the table.
+        kind: CSS class, as of `table`.
+    """
+    heads = [cell.partition("\n") for cell in of.head]
+    head = [Html(escape(a) + (f"<small>{escape(b)}</small>" if b else "")) for a, _, b in heads]
+    title = f"<h3>{text(of.title[:1].upper() + of.title[1:])}</h3>" if of.title else ""
+    note = "".join(f"<p><small>{text(line)}</small></p>" for line in of.note.splitlines())
+    return Html(f"{title}{table(head, of.rows, kind)}{note}")
 
 
 def compared(subjects: Sequence[Subject], rows: Iterable[Row]) -> Html:

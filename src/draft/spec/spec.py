@@ -153,6 +153,7 @@ class Spec:
         more: Mapping[str, Value | str | None] | None = None,
         *,
         errors: LawErrors | None = None,
+        judge: bool = True,
     ) -> Design:
         """Evaluate every number: size actuators, weigh links, run the design filter.
 
@@ -164,6 +165,8 @@ class Spec:
                 puts a block on the trunk, see `draft.spec.payload`.
             more: further values, which override those, and may refer to them.
             errors: errors of the laws, see `draft.design.law_errors`; None for none.
+            judge: whether to run the design filter, which takes most of the time. A design that is
+                not judged has no findings, and is for its numbers alone.
 
         Returns:
             The design; with arrays, N designs of this topology at once.
@@ -190,4 +193,4 @@ class Spec:
         if more:
             table = merged(table, more)
         spec = with_payload(self, table)
-        return resolve(spec, table, label=label, places=places, errors=errors)
+        return resolve(spec, table, label=label, places=places, errors=errors, judge=judge)

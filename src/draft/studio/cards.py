@@ -31,6 +31,9 @@ border-bottom:1px solid #e7eaee}
 .ds .tight td{white-space:nowrap;font-size:11px;letter-spacing:-.1px}
 .ds .tight td.n{padding-left:4px}
 .ds .mute{color:#66727f}
+.ds tr.why td{white-space:normal;padding:0 0 3px 8px;line-height:1.2}
+.ds td.limit{white-space:normal;padding-left:8px}
+.ds ul{margin:0;padding-left:16px}
 .ds .big{font-size:26px;font-weight:600;line-height:1.2;font-variant-numeric:tabular-nums}
 .ds .row{display:flex;justify-content:space-between;align-items:baseline;gap:8px}
 .ds .chip{font-size:12px;font-weight:600;padding:1px 9px;border-radius:9px;white-space:nowrap}

@@ -15,19 +15,14 @@ from draft.design import Design
 from draft.errors import DraftError
 from draft.explore.sensitivity import sensitivity, stated_numbers
 from draft.explore.solve import Solution, solve
-from draft.metrics import METRICS, find, of_design
+from draft.metrics import find, of_design
+from draft.metrics.registry import reads_verdict
 from draft.studio import fields
 from draft.values import Array, brief, scalar
 
 NOTHING = "(none)"
 _POINTS, _ROUNDS = 65, 3  # Of the search for the value that holds a metric.
 _EVEN = 1e-9  # Relative change of a metric that counts as none.
-
-
-def metrics() -> list[str]:
-    """Metrics that a slider's effect on can be shown at once."""
-    closed = (one for one in METRICS.values() if one.needs == "design")
-    return [one.name for one in closed if one.unit != "bool"]
 
 
 @dataclass
@@ -50,7 +45,7 @@ class Levers:
         """Effect of a step of each stated number on the metric, as short text by name."""
         if not self.metric:
             return {}
-        found = sensitivity(design, [self.metric], samples=2)
+        found = sensitivity(design, [self.metric], samples=2, verdicts=False)
         return {
             name: effect_text(float(found.step_up[i, 0]), float(found.step_down[i, 0]))
             for i, name in enumerate(found.names)
@@ -111,7 +106,7 @@ def hold(
 
     def missed(points: Array) -> Array:
         values = {**moved, follower: points}
-        many = design.spec.resolve(design.values, values)
+        many = design.spec.resolve(design.values, values, judge=reads_verdict([metric]))
         found = np.asarray(of_design(many, [metric])[metric], float)
         return np.broadcast_to(found, len(points)) - target
 

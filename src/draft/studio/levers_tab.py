@@ -8,10 +8,10 @@ from typing import Any
 import viser
 
 from draft.errors import DraftError
-from draft.explore.sensitivity import stated_numbers
+from draft.explore.sensitivity import closed_metrics, stated_numbers
 from draft.explore.solve import Solution
 from draft.studio import cards
-from draft.studio.levers import NOTHING, Levers, between, metrics, to_target
+from draft.studio.levers import NOTHING, Levers, between, to_target
 from draft.studio.session import Session
 from draft.studio.tasks import TaskThread
 
@@ -28,7 +28,7 @@ class LeversTab:
         """Add the elements."""
         self._session, self._tasks, self._levers = session, tasks, levers
         self._message = ""
-        names = [NOTHING, *metrics()]
+        names = [NOTHING, *closed_metrics(())]
         numbers = [NOTHING, *stated_numbers(session.design)]
         self._metric = gui.add_dropdown(
             "effect on", names, hint="Sliders show what a step of each does to this metric."

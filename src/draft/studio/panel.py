@@ -20,6 +20,7 @@ from draft.studio.drop import Drop
 from draft.studio.levers import Levers
 from draft.studio.levers_tab import LeversTab
 from draft.studio.library import DEFAULT
+from draft.studio.pinned_tab import PinnedTab
 from draft.studio.scene3d import RobotMesh, surroundings
 from draft.studio.session import Session
 from draft.studio.tasks import TaskThread
@@ -72,6 +73,7 @@ class Panel:
         self._tasks = TaskThread(self.refresh, self._simulate)
         self._levers = Levers()
         self._pull: LeversTab | None = None
+        self._pinned: PinnedTab | None = None
         self._controls = Controls(client.gui, session, self._tasks, self._levers)
         self._walking = WalkControls(client.gui, self._walker, self._tasks, self._set_walking)
         self._robot = RobotMesh(client.scene, "/robot")
@@ -100,6 +102,8 @@ class Panel:
     def close(self) -> None:
         """End the thread of the tab, and with it the walk."""
         self._tasks.close()
+        if self._pinned is not None:
+            self._pinned.close()
 
     def refresh(self) -> None:
         """Show the state of the session: the robot first, then the numbers that changed."""
@@ -118,6 +122,8 @@ class Panel:
             self._controls.update_actuators()
             self._controls.refresh()
             self._walking.refresh()
+            if self._pinned is not None:
+                self._pinned.refresh(self._client.gui)
             self._design.options = (DEFAULT, *self._session.library.names())
             if not self._tasks.waits("design"):
                 self._design.value = self._session.title
@@ -189,6 +195,7 @@ class Panel:
             self._show(lambda: cards.actuators(session.design))
         with panel.add_tab("Trends"):
             self._show(lambda: trend_cards.trends(session))
+        self._pinned = PinnedTab(panel, session)
         panel.dock_below(self._client.gui.main_panel)
 
     def _levers_card(self) -> str:

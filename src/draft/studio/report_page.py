@@ -1,4 +1,4 @@
-"""The report page of a tab: its design, and the pinned one beside it."""
+"""The report page of a tab: its design, compared with the pinned one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def report_page(session: Session) -> str:
     """HTML of the report, or of the error message where it cannot be made."""
     designs = [session.design]
     if session.pinned is not None and session.pinned.design is not session.design:
-        designs.append(session.pinned.design)
+        designs.insert(0, session.pinned.design)
     try:
         return page(subjects(designs))
     except DraftError as error:
