@@ -283,6 +283,11 @@ def by_topology(members: Sequence[LeggedRobot]) -> list[tuple[LeggedRobot, ...]]
     return [tuple(group) for group in found.values()]
 
 
+def kind_of(members: Sequence[LeggedRobot]) -> str:
+    """Name of the robot that members of one topology are designs of."""
+    return members[0].name.rpartition(":")[0] or members[0].name
+
+
 def check_family(members: Sequence[LeggedRobot]) -> None:
     """Check that quadrupeds can share one simulation.
 

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.learn.bodies.features import GRAVITY
-from draft.learn.bodies.legged import REFERENCE_LEG
 from draft.learn.bodies.slots import (
     FEATURES,
     LEGS,
@@ -64,63 +63,64 @@ LAYOUTS = {"actor": _ACTOR, "critic": _CRITIC}
 
 
 @dataclass(frozen=True)
-class Padding:
-    """Where the entries of a padded observation come from.
+class Places:
+    """Where the entries of a robot's own observation go in the padded one.
 
     Attributes:
-        source: index of the entry of the robot's own observation; its length for none, shape
-            (entries,).
-        sign: sign of each entry, shape (entries,).
-        powers: powers of sqrt(g L) and of sqrt(L / g) that each is divided by, shape (2, entries).
+        entry: index of the padded entry; -1 for joints without a slot, shape (n,).
+        sign: sign of each, shape (n,).
+        share: how many entries of the robot go there: they count by their mean, shape (n,).
     """
 
-    source: NDArray[np.intp]
+    entry: NDArray[np.intp]
     sign: Array
-    powers: Array
+    share: Array
 
-    def factor(self, scale: float) -> Array:
-        """Factor from a robot's own entries to the padded ones, shape (entries,).
+    def sources(self, group: str) -> tuple[NDArray[np.intp], Array]:
+        """For each padded entry the index of the robot's own, n for none, and its sign.
 
         Args:
-            scale: s = L / 0.48 m of the robot.
+            group: "actor" or "critic".
         """
-        length = scale * REFERENCE_LEG
-        units = np.log([math.sqrt(GRAVITY * length), math.sqrt(length / GRAVITY)])
-        return self.sign * np.exp(-units @ self.powers)
+        source, sign = np.full(size(group), len(self.entry)), np.ones(size(group))
+        for i in np.flatnonzero(self.entry >= 0):
+            source[self.entry[i]], sign[self.entry[i]] = i, self.sign[i]
+        return source, sign
 
 
-def padding(group: str, terms: Sequence[tuple[str, int]], slots: Slots) -> Padding:
-    """Return where the entries of an observation's padded form come from.
+def places(group: str, terms: Sequence[tuple[str, int]], slots: Slots) -> Places:
+    """Return where the entries of a robot's own observation go.
 
     Args:
         group: "actor" or "critic".
-        terms: names and lengths of the terms of the robot's own observation, in order.
+        terms: names and lengths of the terms of the robot's own observation, in order; those that
+            the padded one lacks are left out.
         slots: slots of the robot.
-
-    Raises:
-        KeyError: the robot's observation lacks a term.
     """
-    start, starts = 0, {}
+    first, of = starts(group), {"joints": slots.joints, "legs": slots.legs}
+    entry, sign = [], []
     for name, length in terms:
-        starts[name] = start
-        start += length
-    source, sign, powers = [], [], []
-    places = {"joints": slots.joints, "legs": slots.legs}
-    for name, part in LAYOUTS[group].items():
-        count = _length(part)
-        at = np.full(count, start)
-        own = np.ones(count)
-        if part.of in places:
-            for i, place in enumerate(places[part.of]):
-                if place >= 0:
-                    at[place] = starts[name] + i
-                    own[place] = slots.signs[i] if part.of == "joints" else 1.0
-        else:
-            at = starts[name] + np.arange(count)
-        source.append(at)
-        sign.append(own)
-        powers += list(part.powers) * (count // len(part.powers))
-    return Padding(np.concatenate(source), np.concatenate(sign), np.array(powers).T)
+        part = LAYOUTS[group].get(name)
+        own: Sequence[int] = [-1] * length
+        if part is not None:
+            own = [first[name] + i if i >= 0 else -1 for i in of.get(part.of, range(length))]
+        entry += own
+        sign += slots.signs if part is not None and part.of == "joints" else [1.0] * length
+    at = np.array(entry)
+    share = np.array([entry.count(i) if i >= 0 else 1 for i in entry], float)
+    return Places(at, np.array(sign), share)
+
+
+def powers(group: str) -> Array:
+    """Powers of sqrt(g L) and of sqrt(L / g) that padded entries are divided by, (2, entries)."""
+    of_all = [part.powers * (_length(part) // len(part.powers)) for part in LAYOUTS[group].values()]
+    return np.concatenate(of_all).T
+
+
+def units(group: str, length: float) -> Array:
+    """Factor of each padded entry from a robot's units, for its leg length L [m]."""
+    sizes = np.log([math.sqrt(GRAVITY * length), math.sqrt(length / GRAVITY)])
+    return np.exp(-sizes @ powers(group))
 
 
 def size(group: str) -> int:

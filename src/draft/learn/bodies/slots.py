@@ -84,6 +84,21 @@ def slots_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> Slots:
     return _Pose(member, model).slots()
 
 
+def describe(member: LeggedRobot, model: mujoco.MjModel | None = None) -> tuple[Slots, Array]:
+    """Return the slots of a robot and its numbers by slots, shape (FEATURES,); see `slot_features`.
+
+    Args:
+        member: the robot.
+        model: its model; None to compile it.
+
+    Raises:
+        DraftError: as `slots_of`.
+    """
+    pose = _Pose(member, model)
+    slots = pose.slots()
+    return slots, pose.features(slots)
+
+
 class _Pose:
     """A robot in its home pose."""
 
@@ -183,8 +198,7 @@ def slot_features(members: Sequence[LeggedRobot]) -> list[tuple[float, ...]]:
         DraftError: as `slots_of`.
     """
     if len(members) == 1:
-        pose = _Pose(members[0])
-        return [tuple(pose.features(pose.slots()).tolist())]
+        return [tuple(describe(members[0])[1].tolist())]
     first, fields = family_fields(tuple(members))
     model, found = copy.copy(first), []
     data = mujoco.MjData(model)

@@ -16,7 +16,7 @@ from mjlab.rl import RslRlVecEnvWrapper
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from draft.learn.bodies.padding import LAYOUTS, mirror_image, padding
+from draft.learn.bodies.padding import LAYOUTS, mirror_image, places, powers
 from draft.learn.bodies.slots import SLOTS, mirrored_slots, slots_of
 from draft.learn.task.world.access import robot_of
 from draft.learn.task.world.mirror import Flip
@@ -92,14 +92,12 @@ class _Part:
         self._pads = {}
         for group in LAYOUTS:
             dims = (one[0] for one in manager.group_obs_term_dim[group])
-            found = padding(group, list(zip(manager.active_terms[group], dims, strict=True)), slots)
-            self._pads[group] = tuple(
-                torch.from_numpy(np.ascontiguousarray(one)).to(device)
-                for one in (
-                    found.source,
-                    found.sign.astype(np.float32),
-                    found.powers.astype(np.float32),
-                )
+            terms = list(zip(manager.active_terms[group], dims, strict=True))
+            source, sign = places(group, terms, slots).sources(group)
+            self._pads[group] = (
+                torch.from_numpy(source).to(device),
+                torch.from_numpy(sign).float().to(device),
+                torch.from_numpy(powers(group)).float().to(device),
             )
         driven = [joint for joint, slot in enumerate(slots.joints) if slot >= 0]
         self._driven = torch.tensor(driven, device=device)
@@ -110,12 +108,12 @@ class _Part:
 
     def padded(self, seen: TensorDict) -> TensorDict:
         """Observations of this environment's worlds in the slots."""
-        scale = self._robot.unit_logarithms()  # (worlds, 2)
+        scale = self._robot.unit_logarithms()
         found = {}
-        for group, (source, sign, powers) in self._pads.items():
+        for group, (source, sign, power) in self._pads.items():
             values = seen[group]
             wide = torch.cat((values, values.new_zeros(len(values), 1)), dim=1)
-            factor = sign * torch.exp(-scale @ powers)
+            factor = sign * torch.exp(-scale @ power)
             found[group] = (wide[:, source] * factor).clamp(-_MOST, _MOST)
         return TensorDict(found, batch_size=seen.batch_size)
 

@@ -9,7 +9,8 @@ import torch
 from mjlab.envs import ManagerBasedRlEnv
 from mjlab.rl import RslRlVecEnvWrapper
 
-from draft.learn.bodies.legged import LeggedRobot, by_topology
+from draft.learn.bodies.legged import LeggedRobot, by_topology, kind_of
+from draft.learn.engine.rows import BODIES_ERROR
 from draft.learn.engine.worlds.mixture import Mixture
 from draft.learn.engine.worlds.ranks import Ranks, rank_seed
 from draft.learn.engine.worlds.simulate import make
@@ -18,6 +19,7 @@ from draft.learn.task.mdp.environment import environment
 from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.log import Row, Tally
 from draft.learn.training.ppo.snapshot import capture, restore
+from draft.learn.training.progress import FASTEST
 from draft.learn.training.run import Plan
 
 
@@ -116,8 +118,7 @@ class Worlds:
             known = [row[name] for row in rows if not math.isnan(row.get(name, math.nan))]
             found[name] = sum(known) / len(known) if known else math.nan
         for members, row in zip(self._groups, rows, strict=True):
-            robot = members[0].name.rpartition(":")[0] or members[0].name
-            found |= {f"{robot}/{name}": row[name] for name in _OF_EACH if name in row}
+            found |= {f"{kind_of(members)}/{name}": row[name] for name in _OF_EACH if name in row}
         return found
 
     def state(self) -> dict[str, Any]:
@@ -151,4 +152,4 @@ class Worlds:
             env.close()
 
 
-_OF_EACH = ("tracking_error", "falls", "curriculum/fastest")
+_OF_EACH = ("tracking_error", "falls", "episode_s", BODIES_ERROR, FASTEST)
