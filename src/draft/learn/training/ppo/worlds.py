@@ -76,7 +76,7 @@ class Worlds:
         self._bodies: list[Bodies | None] = []
         for k, (env, members) in enumerate(zip(self.envs, self._groups, strict=True)):
             in_turn = len(members) > share(plan.environments, k, len(self._groups))
-            taken = in_turn or plan.mixed
+            taken = in_turn or (plan.mixed and len(members) > 1)
             self._bodies.append(Bodies(env, members, plan.seed, ranks) if taken else None)
 
     @property
