@@ -116,7 +116,7 @@ def measured(
     """
     from draft.learn.measuring.rollout.evaluate import evaluate
     from draft.learn.measuring.rollout.trial import Trial
-    from draft.learn.training.ppo.trainer import task_of
+    from draft.learn.training.ppo.worlds import task_of
 
     root = math.sqrt(GRAVITY * member.leg_length)
     most = source.forward_for(member)

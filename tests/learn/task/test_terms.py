@@ -180,7 +180,7 @@ def test_what_a_term_raises_is_one_line(still: str) -> None:
 def test_an_environment_has_the_terms_of_its_configuration(still: str) -> None:
     pytest.importorskip("mjlab")
     from draft.learn.task.mdp.environment import environment
-    from draft.learn.training.ppo.trainer import task_of
+    from draft.learn.training.ppo.worlds import task_of
 
     task = task_of(plan())
     term = environment(task, 1).rewards["still"]

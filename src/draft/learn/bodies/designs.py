@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from draft.design.findings import first_error
 from draft.design.references import open_designs
@@ -21,13 +22,14 @@ from draft.learn.bodies.legged import (
 from draft.learn.bodies.legged_batch import legged_robots
 from draft.learn.bodies.topology import check_topology
 from draft.model.folder import design_text, design_texts
+from draft.values import Array
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from draft.design import Design
     from draft.spec import Spec
-    from draft.variation.axes import Axis, Vary
+    from draft.variation.axes import Vary
 
 _BLOCK = 1024  # Designs resolved at once.
 _DRAWS_PER_BODY = 50  # Draws before giving up; at least one block.
@@ -103,15 +105,48 @@ def _drawn(
     if count is None:
         remedy = "give the number of designs to draw, such as `bodies=64`"
         raise DraftError("`bodies` is missing", remedy)
-    check_topology(designs[0])
-    draws = _Draws(designs[0], axes.parse(designs[0].spec, vary, values), seed)
+    from draft.variation import sampling
+
+    parsed = axes.parse(designs[0].spec, vary, values)
+    most = _most(count)
+
+    def draw(start: int, size: int) -> Mapping[str, Array]:
+        return sampling.draw(parsed, "sobol", most, seed, start, size)
+
+    return draw_bodies(designs[0], draw, count)
+
+
+def draw_bodies(
+    base: Design,
+    draw: Callable[[int, int], Mapping[str, Array]],
+    count: int,
+    sound: Callable[[Design], NDArray[np.bool_]] | None = None,
+) -> Bodies:
+    """Draw designs until enough of them pass the filter and can be trained.
+
+    Args:
+        base: one design, whose values are replaced by those drawn.
+        draw: values by name, shape (size,), from the index of the first draw and their number.
+        count: number of bodies.
+        sound: which of N designs are wanted, shape (N,); None for all.
+
+    Raises:
+        DraftError: too few pass.
+    """
+    check_topology(base)
+    draws = _Draws(base, draw, sound)
     draws.draw(count)
     note = (
         f"{'1 body' if count == 1 else f'{count} bodies'} of {draws.count} drawn; {draws.reasons()}"
         if draws.refused
         else ""
     )
-    return Bodies(designs[0].spec, joined(draws.members), tuple(draws.texts), note)
+    return Bodies(base.spec, joined(draws.members), tuple(draws.texts), note)
+
+
+def _most(count: int) -> int:
+    """Draws before giving up on a number of bodies."""
+    return max(_DRAWS_PER_BODY * count, _BLOCK)
 
 
 def family(designs: Sequence[Design]) -> tuple[LeggedRobot, ...]:
@@ -176,8 +211,13 @@ class _Draws:
         refused: number of designs refused, by reason.
     """
 
-    def __init__(self, base: Design, axes: tuple[Axis, ...], seed: int) -> None:
-        self.base, self.axes, self.seed = base, axes, seed
+    def __init__(
+        self,
+        base: Design,
+        draw: Callable[[int, int], Mapping[str, Array]],
+        sound: Callable[[Design], NDArray[np.bool_]] | None,
+    ) -> None:
+        self.base, self._draw, self._sound = base, draw, sound
         self.members: list[LeggedRobot] = []
         self.texts: list[str] = []
         self.count = 0
@@ -189,12 +229,9 @@ class _Draws:
         Raises:
             DraftError: too few pass.
         """
-        from draft.variation import sampling
-
         fixed = dict(self.base.values)
-        most = max(_DRAWS_PER_BODY * count, _BLOCK)
-        for start in range(0, most, _BLOCK):
-            drawn = sampling.draw(self.axes, "sobol", most, self.seed, start, _BLOCK)
+        for start in range(0, _most(count), _BLOCK):
+            drawn = dict(self._draw(start, _BLOCK))
             self._accept(self.base.spec.resolve(fixed, drawn), count)
             if len(self.members) == count:
                 return
@@ -205,7 +242,8 @@ class _Draws:
     def _accept(self, block: Design, count: int) -> None:
         """Accept designs of a block, in order, until there are `count`."""
         accepted = np.broadcast_to(np.asarray(block.accepted), _BLOCK)
-        rows = np.flatnonzero(accepted)
+        sound = np.ones(_BLOCK, bool) if self._sound is None else self._sound(block)
+        rows = np.flatnonzero(accepted & sound)
         found: dict[int, LeggedRobot | DraftError] = {}
         kept: list[int] = []
         for row in range(_BLOCK):
@@ -214,6 +252,9 @@ class _Draws:
             self.count += 1
             if not accepted[row]:
                 self.refused[first_error(block.findings, row)] += 1
+                continue
+            if not sound[row]:
+                self.refused["motors too weak to stand"] += 1
                 continue
             if row not in found:
                 # As many as may be missing: most of those that pass can be trained.

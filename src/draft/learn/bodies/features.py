@@ -15,7 +15,7 @@ from draft.learn.bodies.legged import CLASSES, REFERENCE_LEG, LeggedRobot
 from draft.learn.bodies.payload import model_spec
 
 GRAVITY = 9.81
-_MASS = 30.0  # Approximate mass of a quadruped of scale one [kg].
+MASS = 30.0  # Approximate mass of a quadruped of scale one [kg].
 FEATURES = (
     *("leg length", "mass", "height", "thigh", "stance length", "stance width"),
     *(
@@ -37,7 +37,7 @@ def readable(logarithms: ArrayLike, member: LeggedRobot) -> NDArray[np.float64]:
     """
     length, mass = member.leg_length, member.mass
     joint = (mass * GRAVITY * length, math.sqrt(GRAVITY / length), mass * length**2)
-    per = (REFERENCE_LEG, _MASS * member.scale**3, *(length,) * 4, *joint * len(CLASSES))
+    per = (REFERENCE_LEG, MASS * member.scale**3, *(length,) * 4, *joint * len(CLASSES))
     return np.exp(np.asarray(logarithms, float)) * per
 
 
@@ -82,7 +82,7 @@ def family_features(members: tuple[LeggedRobot, ...]) -> list[tuple[float, ...]]
 def _features(member: LeggedRobot, model: mujoco.MjModel, data: mujoco.MjData) -> tuple[float, ...]:
     length, mass = member.leg_length, member.mass
     inertia = [float(model.dof_M0[model.joint(name).dofadr[0]]) for name in member.joints]
-    numbers = [member.scale, mass / member.scale**3 / _MASS, member.height / length]
+    numbers = [member.scale, mass / member.scale**3 / MASS, member.height / length]
     numbers += [size / length for size in _sizes(model, data, member)]
     for joints in zip(*member.leg_joints, strict=True):
         numbers += [

@@ -272,6 +272,22 @@ def with_one_template(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]
     return tuple(replace(member, text=text) for member, text in zip(members, texts, strict=True))
 
 
+_TOPOLOGY = ("trunk", "joints", "leg_joints", "feet", "foot_geoms", "upper_legs", "mirror")
+
+
+def by_topology(members: Sequence[LeggedRobot]) -> list[tuple[LeggedRobot, ...]]:
+    """Divide robots into those that can share a simulation, in the order of the first of each."""
+    found: dict[tuple[object, ...], list[LeggedRobot]] = {}
+    for member in members:
+        found.setdefault(tuple(getattr(member, what) for what in _TOPOLOGY), []).append(member)
+    return [tuple(group) for group in found.values()]
+
+
+def kind_of(members: Sequence[LeggedRobot]) -> str:
+    """Name of the robot that members of one topology are designs of."""
+    return members[0].name.rpartition(":")[0] or members[0].name
+
+
 def check_family(members: Sequence[LeggedRobot]) -> None:
     """Check that quadrupeds can share one simulation.
 
@@ -280,7 +296,7 @@ def check_family(members: Sequence[LeggedRobot]) -> None:
     """
     first = members[0]
     for other in members[1:]:
-        for what in ("trunk", "joints", "leg_joints", "feet", "foot_geoms", "upper_legs", "mirror"):
+        for what in _TOPOLOGY:
             if getattr(other, what) != getattr(first, what):
                 cause = (
                     f"{other.name} has another topology than {first.name}: its "

@@ -103,7 +103,7 @@ def measure(
     from draft.learn.engine.machine import NATIVE, cores
     from draft.learn.measuring.rollout.evaluate import evaluate
     from draft.learn.measuring.rollout.trial import Trial
-    from draft.learn.training.ppo.trainer import task_of
+    from draft.learn.training.ppo.worlds import task_of
 
     check_family(members)
     orders = [source.match(member).joints for member in members]

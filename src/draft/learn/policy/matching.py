@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from draft.learn.bodies.slots import knee_of
+
 if TYPE_CHECKING:
     import mujoco
 
@@ -138,7 +140,7 @@ def structure_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> St
         for place, joint in enumerate(joints):
             places[joint] = (side, int(ahead.sum()), place)
         points = np.array([*anchors[list(joints)], feet[leg]])
-        knee, bend = _knee(points, axes[list(joints)])
+        knee, bend = knee_of(points, axes[list(joints)])
         bends[joints[knee]] = bend
     return Structure(tuple(places), tuple(map(tuple, axes.tolist())), tuple(bends))
 
@@ -169,23 +171,6 @@ def _shipped_structure() -> tuple[tuple[str, ...], Structure]:
 
     robot = legged_robot(load(ROBOT).resolve())
     return robot.joints, structure_of(robot)
-
-
-def _knee(points: NDArray[np.float64], axes: NDArray[np.float64]) -> tuple[int, float]:
-    """Joint between the two long links of a leg, and its angle from the straight leg [rad].
-
-    Args:
-        points: anchors of the joints from the trunk outwards, and the foot, shape (joints + 1, 3).
-        axes: axes of the joints, shape (joints, 3).
-    """
-    links = np.diff(points, axis=0)
-    lengths = np.linalg.norm(links, axis=1)
-    knee = 1 + int(np.minimum(lengths[:-1], lengths[1:]).argmax()) if len(axes) > 1 else 0
-    if not knee:
-        return 0, 0.0
-    axis = axes[knee]
-    above, below = (one - axis * (one @ axis) for one in links[knee - 1 : knee + 1])
-    return knee, float(np.arctan2(axis @ np.cross(above, below), above @ below))
 
 
 def match(

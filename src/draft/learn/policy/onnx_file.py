@@ -8,7 +8,7 @@ weights of single or half precision. The file is decoded by the wire format of P
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -85,6 +85,34 @@ class Network:
     def units(self) -> tuple[int, ...]:
         """Return the number of units of each hidden layer."""
         return tuple(len(bias) for _, bias in self.layers()[2][:-1])
+
+
+def of_layers(
+    mean: Array,
+    divisor: Array,
+    layers: Sequence[tuple[Array, Array]],
+    metadata: Mapping[str, str],
+) -> Network:
+    """Make a network from what `Network.layers` returns.
+
+    Args:
+        mean: mean of the input, shape (size,).
+        divisor: divisor of the input, shape (size,).
+        layers: weights, shape (outputs, inputs), and bias, shape (outputs,), of each layer.
+        metadata: metadata as text by key.
+    """
+    weights = {"mean": mean, "divisor": divisor}
+    steps: list[tuple[Callable[..., Array], tuple[str, ...], str]] = [
+        (np.subtract, ("input", "mean"), "centred"),
+        (np.divide, ("centred", "divisor"), "0"),
+    ]
+    for i, (weight, bias) in enumerate(layers):
+        weights |= {f"weight {i}": weight, f"bias {i}": bias}
+        steps.append((_gemm, (str(i), f"weight {i}", f"bias {i}"), f"sum {i}"))
+        if i + 1 < len(layers):
+            steps.append((_elu, (f"sum {i}",), str(i + 1)))
+    single = {name: np.asarray(values, np.float32) for name, values in weights.items()}
+    return Network(len(mean), metadata, tuple(steps), single, "input", steps[-1][2])
 
 
 def read(path: Path) -> Network:

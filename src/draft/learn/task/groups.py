@@ -303,6 +303,9 @@ class Velocity:
     action_rate_weight: float = choice(
         -0.01, "1", "weight of the squared change of the action", CODE, within=ANY
     )
+    progress: float = choice(
+        0.0, "1", "weight of the speed along the command, per its size, in stage any", DRAFT
+    )
     speed_weight: float = choice(
         0.6, "1", "weight of the speed in the commanded sense, per v_cap", CODE, within=ANY
     )
@@ -396,6 +399,7 @@ class Learning:
         2000, "1", "iterations of stage terrain", CODE, within=ITERATIONS
     )
     iterations_push: int = choice(1500, "1", "iterations of stage push", CODE, within=ITERATIONS)
+    iterations_any: int = choice(4000, "1", "iterations of stage any", DRAFT, within=ITERATIONS)
     save_every: int = choice(250, "1", "iterations between two checkpoints", CODE, within=POSITIVE)
     hidden: tuple[int, ...] = choice(
         (512, 256, 128),

@@ -3,6 +3,7 @@
 `paper` is the published configuration, for a GPU: some hundred million steps per stage. `laptop`
 learns from a hundredth of them; it changes only the numbers below, each for the reason given.
 `tune` is `laptop` for policies that can run already, such as that of a family with one more body.
+`any` trains one policy for robots of any legs.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 from draft.learn.task.config import Config
 from draft.learn.task.stages import STAGES
 
-RecipeName = Literal["paper", "laptop", "tune"]
+RecipeName = Literal["paper", "laptop", "tune", "any"]
 
 
 class Change(NamedTuple):
@@ -117,7 +118,31 @@ TUNE = Recipe(
     },
     LAPTOP.plane,
 )
-RECIPES = {recipe.name: recipe for recipe in (Recipe("paper"), LAPTOP, TUNE)}
+ANY = Recipe(
+    "any",
+    {
+        **LAPTOP.changes,
+        "learning.environments": Change(1024, "some 200 of each topology"),
+        "learning.iterations_any": Change(2500, "60 million steps"),
+        "learning.entropy": Change(0.005, "its sum over the joints is that of twelve for most"),
+        "learning.decay": Change(0.3, "the last steps no longer explore"),
+        "velocity.forward": Change(2.17, "sqrt(g L)"),
+        "velocity.sideways": Change(0.5, "0.23 sqrt(g L)"),
+        "velocity.turn": Change(1.5, "0.33 sqrt(g / L)"),
+        "velocity.growth": Change(0.05, "commands grow as fast as the worst cell learns"),
+        "velocity.missed": Change(0.6, "commands grow past what a body can do"),
+        "velocity.progress": Change(0.5, "a robot that stands keeps all other rewards"),
+        "velocity.pushed": Change(0.2, "one policy also learns to survive kicks"),
+        "rewards.linear_sigma": Change(0.35, "slow commands are followed, not ignored"),
+        "rewards.power_weight": Change(-0.05, "joints that shake cost power"),
+        "episodes.contact_time": Change((0.01, 0.01), "stiffer feet than the published"),
+        "episodes.delay": Change((0.0, 0.015), "targets reach real motors late"),
+        "episodes.motor": Change((0.95, 1.05), "no two motors are alike"),
+        "episodes.joint_friction": Change((0.0, 0.02), "no joint is free of it"),
+    },
+    LAPTOP.plane,
+)
+RECIPES = {recipe.name: recipe for recipe in (Recipe("paper"), LAPTOP, TUNE, ANY)}
 
 
 def default(devices: Sequence[str]) -> Recipe:

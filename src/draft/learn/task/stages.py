@@ -123,6 +123,31 @@ def velocity(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
     )
 
 
+def any_legs(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
+    """Walk from scratch at commands that grow, with one policy for robots of any legs.
+
+    Sums over joints count as those of twelve. Robots on two legs are asked half of the speed.
+    """
+    from mjlab.managers.reward_manager import RewardTermCfg
+
+    from draft.learn.task.mdp import rewards
+
+    numbers, v, member = task.config.rewards, task.config.velocity, task.members[0]
+    command, terms = _command(cfg), cfg.rewards
+    share = _JOINTS / len(member.joints)
+    terms["action_rate"].params["ramp"] = numbers.action_rate_ramp
+    for name in ("action_rate", "joint_limits"):
+        terms[name].weight *= share
+    if len(member.feet) == 2:
+        largest = v.forward * _ON_TWO_LEGS, v.sideways * _ON_TWO_LEGS, v.turn
+        command.set_largest(*map(Scaled, largest), task)
+    if v.progress:
+        gate = scaled(numbers, "clearance_gate")
+        terms["progress"] = RewardTermCfg(
+            func=rewards.progress, weight=v.progress, params={"gate": gate}
+        )
+
+
 def terrain(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
     """Move to harder rows of ground by crossing easier ones."""
     from mjlab.managers.curriculum_manager import CurriculumTermCfg
@@ -181,11 +206,13 @@ def _slow(task: Task) -> tuple[Scaled, Scaled, Scaled]:
 
 
 # Stages of the paper, which a study trains unless its file names others.
+_JOINTS = 12  # Of the robots that the weights of the rewards are for.
+_ON_TWO_LEGS = 0.5
 PUBLISHED = (
     Stage("base", base, origin=None),
     Stage("velocity", velocity, test="speed"),
     Stage("terrain", terrain, shares="terrain", uneven=True, test="stairs"),
     Stage("push", push, test="push"),
 )
-for _stage in PUBLISHED:
+for _stage in (*PUBLISHED, Stage("any", any_legs, origin=None, like="velocity")):
     STAGES.add(_stage.name, _stage, __name__)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from draft.learn.bodies.legged import LeggedRobot, with_one_template
-from draft.model.texts import of_template
+from draft.model.texts import Text, of_template
 
 MEMBERS, NUMBERS = "members.json", "members.npz"
 
@@ -28,17 +28,28 @@ def robots_digest(members: Sequence[LeggedRobot]) -> str:
 
 
 def files_of(members: Sequence[LeggedRobot]) -> dict[str, str | bytes]:
-    """Files of the robots by name: the models of a family are one template and arrays."""
-    template = members[0].text.template
-    family = len(members) > 1 and all(one.text.template == template for one in members)
-    robots = [member.as_dict(text=not family) for member in members]
+    """Files of the robots by name: models that differ in numbers are one template and arrays."""
+    templates = list(dict.fromkeys(member.text.template for member in members))
+    shared = len(templates) < len(members)
+    robots = [member.as_dict(text=not shared) for member in members]
     files: dict[str, str | bytes] = {MEMBERS: json.dumps(robots) + "\n"}
-    if family:
+    if shared:
         content = io.BytesIO()
-        numbers = np.stack([member.text.numbers for member in members])
-        np.savez_compressed(content, template=np.array(template), numbers=numbers)
+        arrays: dict[str, np.ndarray] = {}
+        for k, template in enumerate(templates):
+            own = [member.text for member in members if member.text.template == template]
+            arrays[_nth("template", k)] = np.array(template)
+            arrays[_nth("numbers", k)] = np.stack([text.numbers for text in own])
+        if len(templates) > 1:
+            arrays["of"] = np.array([templates.index(member.text.template) for member in members])
+        np.savez_compressed(content, **arrays)
         files[NUMBERS] = content.getvalue()
     return files
+
+
+def _nth(name: str, k: int) -> str:
+    """Name of the array of a template; that of the first has no number."""
+    return f"{name}_{k}" if k else name
 
 
 def read_members(folder: Path) -> tuple[LeggedRobot, ...]:
@@ -48,7 +59,12 @@ def read_members(folder: Path) -> tuple[LeggedRobot, ...]:
         return with_one_template([LeggedRobot.from_dict(robot) for robot in robots])
     try:
         with np.load(io.BytesIO((folder / NUMBERS).read_bytes())) as found:
-            texts = of_template(str(found["template"]), found["numbers"])
+            places = found["of"] if "of" in found else np.zeros(len(robots), dtype=int)
+            texts: list[Text] = [Text("", np.zeros(0))] * len(robots)
+            for k in range(int(places.max()) + 1):
+                own = of_template(str(found[_nth("template", k)]), found[_nth("numbers", k)])
+                for row, text in zip(np.flatnonzero(places == k), own, strict=True):
+                    texts[row] = text
     except zipfile.BadZipFile as error:
         raise ValueError(f"{NUMBERS}: {error}") from None
     each = zip(robots, texts, strict=True)

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 from draft.errors import DraftError, counted, listed
 from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
-from draft.learn.bodies.legged import LeggedRobot, check_family
+from draft.learn.bodies.legged import LeggedRobot, by_topology, check_family
 from draft.learn.policy.policy import CLIMBING_FAMILY, FAMILY
 from draft.learn.task.config import Config, from_dict
 from draft.learn.task.stages import STAGES
@@ -130,6 +130,11 @@ class Plan:
     see_ground: bool = True
     origin: Origin | None = None
 
+    @property
+    def mixed(self) -> bool:
+        """Whether its robots have several topologies, and one policy that knows joints by slots."""
+        return len(by_topology(self.members)) > 1
+
     @staticmethod
     def of(
         members: tuple[LeggedRobot, ...],
@@ -176,6 +181,7 @@ class Plan:
             "see_ground": self.see_ground,
             "origin": asdict(self.origin) if self.origin else None,
             "config": self.config.of_stage(self.stage).as_dict(),
+            **({"mixed": True} if self.mixed else {}),
         }
 
 
@@ -377,7 +383,8 @@ def open_run(folder: Path) -> Run:
             cause = f"'{folder}' was written by another version of Draft"
             raise DraftError(cause, "train it again in another folder")
         members = read_members(folder)
-        check_family(members)
+        if not record.get("mixed"):
+            check_family(members)
         plan = Plan(
             members=members,
             stage=record["stage"],

@@ -57,7 +57,7 @@ def begin(
             features of a design that has none.
     """
     for member in plan.members:
-        if plan.see_design and not member.is_quadruped:
+        if plan.see_design and not plan.mixed and not member.is_quadruped:
             cause = f"{member.name} has no features that a policy could see: it is no quadruped"
             raise DraftError(cause, "omit `see_design`")
     if not is_run(folder):

@@ -9,10 +9,11 @@ from typing import Any, ParamSpec, Protocol
 from draft.design import Design
 from draft.errors import DraftError, counted
 from draft.learn.bodies.designs import open_bodies
+from draft.learn.bodies.generated import BODIES, generate, together
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.machine import devices
 from draft.learn.task.config import Config
-from draft.learn.task.recipes import RECIPES, TUNE, default
+from draft.learn.task.recipes import ANY, RECIPES, TUNE, default
 from draft.learn.training import session as training
 from draft.learn.training.options import TrainOptions
 from draft.learn.training.progress import Progress
@@ -100,12 +101,17 @@ def prepare(
             return open_run(Path(folder))
     numbers, of_design = _split(options.values or {})
     Config().with_values(numbers)
-    # Designs and numbers are checked before devices, for which PyTorch is imported.
-    found = open_bodies(given, options.vary, options.bodies, of_design, options.seed)
+    if given == [ANY.name]:
+        options = _of_any(options)
+        found = together(generate(options.bodies or BODIES, options.seed))
+    else:
+        # Designs and numbers are checked before devices, for which PyTorch is imported.
+        found = open_bodies(given, options.vary, options.bodies, of_design, options.seed)
     if found.note:
         report(found.note)
     family = found.members
-    named = () if len(options.vary) else family  # Designs that are drawn take turns.
+    drawn = len(options.vary) or given == [ANY.name]
+    named = () if drawn else family  # Designs that are drawn take turns.
     _check_worlds(options.envs, named)
     recipe = RECIPES[options.recipe] if options.recipe else default(devices(options.device))
     config = recipe.config.with_values(numbers)
@@ -120,6 +126,21 @@ def prepare(
     # Before anything is written.
     training.check_fits(plan, training.setting(plan, options))
     return training.begin(folder, plan, texts, options.origin)
+
+
+def _of_any(options: TrainOptions) -> TrainOptions:
+    """Options of a training with bodies of all kinds.
+
+    Raises:
+        DraftError: one is of a training with one topology.
+    """
+    if len(options.vary):
+        raise DraftError(f"`vary` and '{ANY.name}': its bodies are drawn already", "omit `vary`")
+    if options.stage not in ("base", ANY.name) or options.ground == "uneven":
+        raise DraftError(f"'{ANY.name}' has a stage of its own, on flat ground", "omit `stage`")
+    return options.model_copy(
+        update={"stage": ANY.name, "see_design": True, "recipe": options.recipe or ANY.name}
+    )
 
 
 def _split(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

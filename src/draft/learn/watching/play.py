@@ -27,7 +27,7 @@ from draft.learn.task.mdp.commands import VelocityCommandCfg, command_term
 from draft.learn.task.mdp.environment import environment
 from draft.learn.task.world.access import COMMAND, robot_of
 from draft.learn.training.ppo.loaded import Loaded
-from draft.learn.training.ppo.trainer import task_of
+from draft.learn.training.ppo.worlds import task_of
 from draft.learn.training.run import Run
 
 # Kinds of uneven ground, in the order in which robots are put onto them.

@@ -15,7 +15,7 @@ from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.policy.policy import open_policy
 from draft.learn.task.constants import scaled
 from draft.learn.task.stages import is_like
-from draft.learn.training.ppo.trainer import task_of
+from draft.learn.training.ppo.worlds import task_of
 from draft.learn.training.progress import PROGRESS
 from draft.learn.training.progress import fastest as fastest_commanded
 from draft.learn.training.run import Run, file_digest, open_run

@@ -18,7 +18,7 @@ from draft.learn.measuring.levels import FORWARD_LEAST, STANDING, SkillTest
 from draft.learn.measuring.summary import Request
 from draft.learn.task.mdp.events import inertia_errors
 from draft.learn.task.world.task import Task
-from draft.learn.training.ppo.trainer import task_of
+from draft.learn.training.ppo.worlds import task_of
 from draft.learn.training.run import Run
 
 

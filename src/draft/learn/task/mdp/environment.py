@@ -66,7 +66,7 @@ def environment(
         scene=SceneCfg(
             num_envs=environments,
             terrain=terrain,
-            entities={"robot": robot(task.members, config, before)},
+            entities={"robot": robot(task.members, config, before, task.by_slots)},
             sensors=_sensors(task, terrain),
             extent=2.0,
         ),

@@ -21,8 +21,9 @@ from numpy.typing import ArrayLike
 
 from draft.design.legs import GRAVITY
 from draft.learn.bodies.features import family_features
-from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.bodies.legged import REFERENCE_LEG, LeggedRobot
 from draft.learn.bodies.payload import model_spec
+from draft.learn.bodies.slots import slot_features
 from draft.learn.task.config import Config
 from draft.learn.task.constants import Scaled
 from draft.learn.task.groups import Actuation
@@ -36,11 +37,13 @@ class RobotCfg(EntityCfg):
         members: numbers of each design.
         actuation: gains and limits.
         first: index of the first world among those of all processes.
+        by_slots: whether the features of a design are those of the slots of all legs.
     """
 
     members: tuple[LeggedRobot, ...] = ()
     actuation: Actuation = field(default_factory=Actuation)
     first: int = 0
+    by_slots: bool = False
 
     def build(self) -> Robot:
         """Build the entity."""
@@ -87,7 +90,7 @@ class Robot(Entity):
         members = self.cfg.members
         self.host_member = (self.cfg.first + np.arange(data.nworld)) % len(members)
         self.member = torch.as_tensor(self.host_member, device=device)
-        for name, values in _numbers(members, device).items():
+        for name, values in self._of_designs(members, device).items():
             setattr(self, name, values[self.member])
         self.redrawn = False
         self._motors = torch.ones_like(self.peak_torque)
@@ -103,10 +106,21 @@ class Robot(Entity):
             members: their designs, k of the same topology.
         """
         self.redrawn = True
-        for name, values in _numbers(members, worlds.device).items():
+        for name, values in self._of_designs(members, worlds.device).items():
             getattr(self, name)[worlds] = values
         self._set_gains()
         self._set_state()
+
+    def _of_designs(
+        self, members: Sequence[LeggedRobot], device: str | torch.device
+    ) -> dict[str, torch.Tensor]:
+        features = slot_features(members) if self.cfg.by_slots else family_features(tuple(members))
+        return _numbers(members, features, device)
+
+    def unit_logarithms(self) -> torch.Tensor:
+        """Logarithms of sqrt(g L) and sqrt(L / g) of each world's design, shape (worlds, 2)."""
+        length = self.leg_scale * REFERENCE_LEG
+        return 0.5 * torch.stack(((GRAVITY * length).log(), (length / GRAVITY).log()), dim=1)
 
     def set_motors(self, factors: torch.Tensor) -> None:
         """Multiply the torque of each motor at any command, also its limits.
@@ -179,7 +193,11 @@ NUMBERS = (
 )
 
 
-def _numbers(members: Sequence[LeggedRobot], device: str | torch.device) -> dict[str, torch.Tensor]:
+def _numbers(
+    members: Sequence[LeggedRobot],
+    features: Sequence[ArrayLike],
+    device: str | torch.device,
+) -> dict[str, torch.Tensor]:
     """Numbers of designs by name, shape (designs, ...)."""
     columns: dict[str, Sequence[ArrayLike]] = {
         "leg_scale": [m.scale for m in members],
@@ -190,7 +208,7 @@ def _numbers(members: Sequence[LeggedRobot], device: str | torch.device) -> dict
         "no_load_speed": [m.no_load_speed for m in members],
         "copper_loss": [m.copper_loss for m in members],
         "weight": [GRAVITY * m.mass for m in members],
-        "design": family_features(tuple(members)),
+        "design": features,
         "home": [m.home for m in members],
         "ranges": [m.ranges for m in members],
     }
@@ -200,13 +218,16 @@ def _numbers(members: Sequence[LeggedRobot], device: str | torch.device) -> dict
     }
 
 
-def robot(members: tuple[LeggedRobot, ...], config: Config, before: int = 0) -> RobotCfg:
+def robot(
+    members: tuple[LeggedRobot, ...], config: Config, before: int = 0, by_slots: bool = False
+) -> RobotCfg:
     """Configuration of the robot.
 
     Args:
         members: one design, or several of one topology (see `legged.check_family`).
         config: the numbers.
         before: number of worlds in the processes before this one.
+        by_slots: whether the features of a design are those of the slots of all legs.
     """
     first = members[0]
     colliding = list(first.foot_geoms)
@@ -221,6 +242,7 @@ def robot(members: tuple[LeggedRobot, ...], config: Config, before: int = 0) -> 
         members=members,
         actuation=config.actuation,
         first=before,
+        by_slots=by_slots,
         spec_fn=partial(model_spec, first),
         init_state=EntityCfg.InitialStateCfg(
             pos=(0.0, 0.0, first.height),

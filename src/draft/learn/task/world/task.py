@@ -23,6 +23,8 @@ class Task:
         see_design: whether the policy observes the features of its design.
         see_ground: whether the policy observes the height scan.
         seed: seed of everything random.
+        by_slots: whether the features of a design are those of the slots of all legs, for a policy
+            of several topologies.
     """
 
     members: tuple[LeggedRobot, ...]
@@ -32,3 +34,4 @@ class Task:
     see_design: bool = False
     see_ground: bool = True
     seed: int = 0
+    by_slots: bool = False

@@ -1,10 +1,12 @@
 """PPO with rsl-rl's models, storage and checkpoints, and an update that is fast on CPUs.
 
-It differs from rsl-rl's PPO in five ways. Observations are normalised by statistics that change
+It differs from rsl-rl's PPO in six ways. Observations are normalised by statistics that change
 only between iterations; in rsl-rl they change during a rollout, and the update then measures a KL
 divergence that no gradient caused. All processes share these statistics. Gradients and KL
 divergence of a mini-batch are reduced together. The networks can be kept mirror-symmetric. The
-learning rate and the weight of the entropy can decay at the end.
+learning rate and the weight of the entropy can decay at the end. In a mixture of robots with
+different joints, each learns from the actions of its own joints, and advantages are normalised for
+each topology.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from tensordict import TensorDict
 from torch import distributed
 
 from draft.errors import DraftError
+from draft.learn.engine.worlds.mixture import Mixture
 from draft.learn.task.world.mirror import flips
 from draft.learn.training.ppo.symmetry import Symmetric
 
@@ -55,6 +58,9 @@ class Ppo(PPO):
         parameters = [*self.actor.parameters(), *self.critic.parameters()]
         self.optimizer = torch.optim.Adam(parameters, lr=self.learning_rate, fused=True)
         self._symmetry: Symmetric | None = None
+        # Of a mixture: whether a world's robot has each joint, and the world's topology.
+        self._present: torch.Tensor | None = None
+        self._group: torch.Tensor | None = None
 
     @staticmethod
     def construct_algorithm(obs: TensorDict, env: VecEnv, cfg: dict[str, Any], device: str) -> PPO:
@@ -64,9 +70,11 @@ class Ppo(PPO):
             DraftError: the mirror image of an observation or of a layer is not known.
         """
         alg = PPO.construct_algorithm(obs, env, cfg, device)
+        if isinstance(alg, Ppo) and isinstance(env, Mixture):
+            alg._present, alg._group = env.present, env.group
         if isinstance(alg, Ppo) and alg._symmetric:
             wrapper: Any = env  # mjlab's, which has the environment as `unwrapped`.
-            images = flips(wrapper.unwrapped)
+            images = env.flips() if isinstance(env, Mixture) else flips(wrapper.unwrapped)
             alg._symmetry = Symmetric(
                 alg.actor, alg.critic, images["actor"], images["critic"], images["actions"]
             )
@@ -117,6 +125,18 @@ class Ppo(PPO):
         """
         self._factor = _LAST**share
 
+    def compute_returns(self, obs: TensorDict) -> None:
+        """Compute returns and advantages; those of a mixture are normalised for each topology."""
+        super().compute_returns(obs)
+        storage, group = self.storage, self._group
+        if group is None:
+            return
+        advantages = storage.returns - storage.values
+        for one in group.unique():
+            own = advantages[:, group == one]
+            advantages[:, group == one] = (own - own.mean()) / (own.std() + 1e-8)
+        storage.advantages = advantages
+
     def update(self) -> dict[str, float]:
         """Learn from the rollout, then add its observations to the statistics.
 
@@ -138,12 +158,18 @@ class Ppo(PPO):
                     *(storage.distribution_params or ()),  # Set by the first transition.
                 )
             ]
+            present = self._present
+            if present is not None:
+                present = present.repeat(len(storage.observations), 1)
+                actions, mean, std = rollout[0], *rollout[-2:]
+                rollout[4] = _log_prob(actions, mean, std, present)[:, None]
         sums = torch.zeros(4, device=self.device)
         size = len(rollout[0]) // self.num_mini_batches
         for _ in range(self.num_learning_epochs):
             order = torch.randperm(size * self.num_mini_batches, device=self.device)
             for rows in order.split(size):
-                sums += self._learn(*(one[rows] for one in (*inputs, *rollout)))
+                own = None if present is None else present[rows]
+                sums += self._learn(*(one[rows] for one in (*inputs, *rollout)), present=own)
         with torch.no_grad():
             for model in (self.actor, self.critic) if self.learns_actor else (self.critic,):
                 self._normalise(model, seen)
@@ -166,8 +192,11 @@ class Ppo(PPO):
         old_log_prob: torch.Tensor,
         old_mean: torch.Tensor,
         old_std: torch.Tensor,
+        present: torch.Tensor | None,
     ) -> torch.Tensor:
         """Take one gradient step on a mini-batch, each argument of shape (samples, ...).
+
+        `present` tells which actions move a joint; None for all.
 
         Returns:
             Value loss, surrogate loss, entropy and KL divergence, shape (4,).
@@ -176,15 +205,15 @@ class Ppo(PPO):
         values = self.critic.mlp(seen_by_critic)
         std = action_std(self.actor)
         log_std = std.log()
-        log_prob = (
-            -0.5 * ((actions - mean) / std).square().sum(1)
-            - log_std.sum()
-            - 0.5 * _LOG_2PI * actions.shape[1]
-        )
-        entropy = (log_std + 0.5 * (1 + _LOG_2PI)).sum()
+        log_prob = _log_prob(actions, mean, std, present)
+        entropy = log_std + 0.5 * (1 + _LOG_2PI)
+        entropy = entropy.sum() if present is None else (entropy * present).sum(1).mean()
         with torch.no_grad():
             moved = (old_std.square() + (old_mean - mean).square()) / (2 * std.square())
-            kl = (log_std - old_std.log() + moved - 0.5).sum(1).mean()
+            divergence = log_std - old_std.log() + moved - 0.5
+            if present is not None:
+                divergence = divergence * present
+            kl = divergence.sum(1).mean()
         clip, advantage = self.clip_param, advantages.squeeze(1)
         ratio = (log_prob - old_log_prob.squeeze(1)).exp()
         surrogate = -torch.min(
@@ -265,6 +294,16 @@ class Ppo(PPO):
         normaliser._var += rate * (spread - normaliser._var + (1 - rate) * shift.square())
         normaliser._mean += rate * shift
         normaliser._std = normaliser._var.sqrt()
+
+
+def _log_prob(
+    actions: torch.Tensor, mean: torch.Tensor, std: torch.Tensor, present: torch.Tensor | None
+) -> torch.Tensor:
+    """Logarithm of the probability density of actions, shape (samples,)."""
+    far = -0.5 * ((actions - mean) / std).square()
+    if present is not None:
+        return ((far - std.log() - 0.5 * _LOG_2PI) * present).sum(1)
+    return far.sum(1) - std.log().sum() - 0.5 * _LOG_2PI * actions.shape[1]
 
 
 def action_std(actor: MLPModel) -> torch.Tensor:

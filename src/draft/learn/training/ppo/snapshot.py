@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import torch
 from mjlab.envs import ManagerBasedRlEnv
+from mjlab.managers.event_manager import RecomputeLevel
 
 from draft.errors import DraftError
 
@@ -74,6 +75,12 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
             values.copy_(state["defaults"][name])
     for path, tensor in tensors.items():
         tensor.copy_(saved[path])
+    if state.get("designs"):
+        # The mean inertia, by which the solver stops, is no field of a world: it is computed with
+        # the constants.
+        env.sim.recompute_constants(RecomputeLevel.set_const)
+        for path, tensor in tensors.items():
+            tensor.copy_(saved[path])
     _wait(env)
     env.common_step_counter = state["steps"]
     env._sim_step_counter = state["physics_steps"]

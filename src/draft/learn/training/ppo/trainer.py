@@ -9,25 +9,20 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from mjlab.rl import RslRlVecEnvWrapper
 
 from draft.errors import DraftError, counted
 from draft.learn.engine.machine import WARP
 from draft.learn.engine.worlds.ranks import Ranks, rank_seed
-from draft.learn.engine.worlds.simulate import make
-from draft.learn.engine.worlds.turns import Bodies
 from draft.learn.policy.matching import match_of
 from draft.learn.policy.policy import open_policy
-from draft.learn.task.mdp.environment import environment
-from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.agent import Runner, agent_settings
 from draft.learn.training.ppo.checkpoint import first_sentence, read_checkpoint, write_checkpoint
-from draft.learn.training.ppo.log import Row, Table, Tally
+from draft.learn.training.ppo.log import Row, Table
 from draft.learn.training.ppo.ppo import Ppo
-from draft.learn.training.ppo.snapshot import capture, restore
 from draft.learn.training.ppo.warm_start import ALONE, load_exported, load_policy, widened
+from draft.learn.training.ppo.worlds import Worlds
 from draft.learn.training.progress import PROGRESS, Progress
-from draft.learn.training.run import Origin, Plan, Run
+from draft.learn.training.run import Origin, Run
 
 SAVE_SECONDS = 60.0
 SCAN = "height_scan"
@@ -37,29 +32,11 @@ _BROKEN = (
 )
 
 
-def task_of(plan: Plan) -> Task:
-    """Return the task of a plan."""
-    return Task(
-        members=plan.members,
-        stage=plan.stage,
-        config=plan.config,
-        ground="flat" if plan.ground == "flat" else "uneven",
-        see_design=plan.see_design,
-        see_ground=plan.see_ground,
-        seed=plan.seed,
-    )
-
-
-def share(worlds: int, rank: int, replicas: int) -> int:
-    """Number of worlds of one of several processes; the first ones get the remainder."""
-    return worlds // replicas + (rank < worlds % replicas)
-
-
 class Trainer:
     """One process of a run: an environment, a policy, and their progress.
 
     Attributes:
-        env: the environment.
+        env: the environment, of a mixture that of the first topology.
         runner: rsl-rl's runner.
         iteration: iterations done.
         seconds: seconds of training so far, in all slices [s].
@@ -81,21 +58,13 @@ class Trainer:
             DraftError: the saved state cannot be read, or is that of another run.
         """
         self._run, self._engine, plan = run, engine, run.plan
-        seed = rank_seed(plan.seed, rank)
-        task = task_of(plan)
-        before = sum(share(plan.environments, i, replicas) for i in range(rank))
-        cfg = environment(task, share(plan.environments, rank, replicas), before=before)
-        cfg.seed = seed
-        self.env = make(cfg, device, engine)
-        self._wrapped = RslRlVecEnvWrapper(self.env)
-        self._numbers = agent_settings(plan.config, plan.stage, seed)
+        self._worlds = Worlds(plan, device, engine, rank, replicas)
+        self.env, self._wrapped = self._worlds.envs[0], self._worlds.wrapped
+        self._numbers = agent_settings(plan.config, plan.stage, rank_seed(plan.seed, rank))
         self.runner = Runner(self._wrapped, self._numbers, None, device)
         self._ranks = Ranks(rank, self.runner.gpu_world_size, device)
         self._seen = self._wrapped.get_observations()
-        self._tally = Tally(self.env, self._ranks)
-        # A family of more bodies than worlds takes turns.
-        in_turn = len(plan.members) > plan.environments
-        self._bodies = Bodies(self.env, plan.members, plan.seed, self._ranks) if in_turn else None
+        self._worlds.observe(plan, self._ranks)
         self.iteration, self.seconds = 0, 0.0
         self._total = run.total()
         exported = plan.origin is not None and plan.origin.policy_file is not None
@@ -177,10 +146,8 @@ class Trainer:
             "seconds": self.seconds,
             "processes": self._ranks.count,
             "agent": self.runner.alg.save(),
-            "environment": capture(self.env),
             "seen": dict(self._seen.items()),
-            "length": self._tally.lengths,
-            "bodies": self._bodies.state() if self._bodies else None,
+            **self._worlds.state(),
         }
         rank = self._ranks.rank
         if rank:
@@ -198,7 +165,7 @@ class Trainer:
 
     def close(self) -> None:
         """Close the environment."""
-        self.env.close()
+        self._worlds.close()
 
     def _iterate(self) -> dict[str, float]:
         """Collect steps and update the policy; return the losses."""
@@ -208,12 +175,10 @@ class Trainer:
         with torch.inference_mode():
             for _ in range(self._numbers["num_steps_per_env"]):
                 seen, rewards, dones, extras = self._wrapped.step(alg.act(seen))
-                for group in self.env.observation_manager.active_terms:
-                    finite &= seen[group].isfinite().all()
+                for values in seen.values():
+                    finite &= values.isfinite().all()
                 alg.process_env_step(seen, rewards, dones, extras)
-                self._tally.add(rewards, dones, extras)
-                if self._bodies:
-                    self._bodies.add()
+                self._worlds.add(rewards, dones, extras)
             alg.compute_returns(seen)
         self._seen = seen
         if not self._ranks.all(bool(finite)):
@@ -232,21 +197,17 @@ class Trainer:
         return max(0.0, 1.0 - (self._total - self.iteration) / last) if last else 0.0
 
     def _turn(self) -> None:
-        """Give some worlds new bodies of the family; their episodes end as if by time."""
-        if self._bodies is None:
-            return
-        turned = self._bodies.turn(self.iteration)
-        self._tally.lengths[turned] = 0
-        self._seen = self._wrapped.get_observations()
+        """Give some worlds new bodies of their family."""
+        if self._worlds.turn(self.iteration):
+            self._seen = self._wrapped.get_observations()
 
     def _record(self, losses: dict[str, float], taken: float) -> Row:
-        steps = self._numbers["num_steps_per_env"] * self.env.num_envs
+        steps = self._numbers["num_steps_per_env"] * self._worlds.count
         row = {
             "iteration": float(self.iteration),
             "seconds": self.seconds,
             "steps_per_s": steps * self._ranks.count / taken,
-            **self._tally.fetch(),
-            **(self._bodies.fetch() if self._bodies else {}),
+            **self._worlds.fetch(),
             "learning_rate": self.runner.alg.learning_rate,
             "action_std": self.runner.alg.get_policy().output_std.mean().item(),
             **{f"loss/{name}": value for name, value in losses.items()},
@@ -312,13 +273,10 @@ class Trainer:
         """Restore a saved state of policy and environment."""
         try:
             self.runner.alg.load(content["agent"], None, strict=True)
-            restore(self.env, content["environment"])
+            self._worlds.restore(content)
             for name, values in content["seen"].items():
                 self._seen[name] = values
             self.iteration, self.seconds = int(content["iteration"]), float(content["seconds"])
-            self._tally.lengths.copy_(content["length"])
-            if self._bodies:
-                self._bodies.restore(content["bodies"])
         except (KeyError, RuntimeError, ValueError, TypeError) as error:
             cause = f"{file} is of another design, or of another version: {first_sentence(error)}"
             remedy = "start a new run from its policy: `origin=RUN`"

@@ -1,0 +1,216 @@
+"""Bodies of many topologies to train one policy of all legs on: sizes and motors drawn together.
+
+A body is a spec with values of its parameters, so that it can be saved and opened as any design.
+Its torque rises with its size as that of real robots does, times a factor of its own. What the
+filter refuses, or what its motors cannot hold up, is drawn again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from draft.design import Design
+from draft.learn.bodies.designs import Bodies, draw_bodies
+from draft.spec import load
+from draft.spec.load import ROBOTS
+from draft.values import Array
+
+BODIES = 2000  # Usual number of bodies.
+FOLDER = Path(__file__).parent
+STRENGTH = 0.45  # Half width of the logarithm of the factor on the torque.
+_POWER = 3.3  # Power of the leg length that the torque rises with.
+_MARGIN = 1.6  # Least ratio of peak torque to standing torque.
+Draw = Callable[["_Random"], dict[str, Array]]
+
+
+class _Random:
+    """Random arrays of one length."""
+
+    def __init__(self, rng: np.random.Generator, count: int) -> None:
+        self._rng, self._count = rng, count
+
+    def between(self, low: float, high: float) -> Array:
+        return self._rng.uniform(low, high, self._count)
+
+    def spread(self, low: float, high: float) -> Array:
+        """Even in the logarithm."""
+        return np.exp(self.between(math.log(low), math.log(high)))
+
+    def one_of(self, values: Array) -> Array:
+        """Rows of values, shape (count, ...)."""
+        return values[self._rng.integers(len(values), size=self._count)]
+
+    def strength(self) -> Array:
+        return np.exp(self.between(-STRENGTH, STRENGTH))
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Bodies of one topology.
+
+    Attributes:
+        spec: folder of the robot.
+        share: share of all bodies.
+        draw: draws values of its parameters and actuators.
+    """
+
+    spec: Path
+    share: float
+    draw: Draw
+
+
+def _quadruped(random: _Random) -> dict[str, Array]:
+    thigh = random.spread(0.1, 0.55)
+    shank = thigh * random.between(0.8, 1.2)
+    size = (thigh + shank) / 0.48
+    # Knees back, forward, and toward each other; away from each other is kept for tests.
+    front, rear = random.one_of(np.array([(1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])).T
+    return {
+        "thigh_length": thigh,
+        "shank_length": shank,
+        "trunk_length": 0.52 * size * random.between(0.8, 1.25),
+        "trunk_width": 0.2 * size * random.between(0.7, 1.3),
+        "trunk_height": 0.18 * size * random.between(0.7, 1.2),
+        "hip_spacing": 0.16 * size * random.between(0.8, 1.4),
+        "hip_offset": 0.1 * size * random.between(0.7, 1.2),
+        "crouch": random.between(0.7, 1.6),
+        "front_bend": front,
+        "rear_bend": rear,
+        "torque": 72 * size**_POWER * random.strength(),
+        "speed": 40 / np.sqrt(size) * random.spread(0.35, 1.2),
+        "reduction": random.between(0.9, 2.0),
+    }
+
+
+def _hexapod(random: _Random) -> dict[str, Array]:
+    femur = random.spread(0.09, 0.32)
+    tibia = femur * random.between(1.1, 1.55)
+    size = (femur + tibia) / 0.38
+    return {
+        "femur_length": femur,
+        "tibia_length": tibia,
+        "body_length": 0.44 * size * random.between(0.8, 1.4),
+        "body_width": 0.2 * size * random.between(0.8, 1.5),
+        "body_height": 0.08 * size * random.between(0.8, 1.3),
+        "lift": random.between(0.25, 0.85),
+        "foot_radius": np.clip(0.018 * size, 0.006, 0.045),
+        "actuators.leg.peak_torque": 14 * size**_POWER * random.strength(),
+        "actuators.leg.no_load_speed": 12 / np.sqrt(size) * random.between(0.9, 2.2),
+    }
+
+
+def _biped(random: _Random) -> dict[str, Array]:
+    thigh = random.spread(0.16, 0.5)
+    shank = thigh * random.between(0.85, 1.15)
+    size = (thigh + shank) / 0.6
+    return {
+        "thigh_length": thigh,
+        "shank_length": shank,
+        "pelvis_height": 0.16 * size * random.between(0.8, 2.2),
+        "pelvis_depth": 0.2 * size * random.between(0.8, 1.2),
+        "foot_length": np.clip(0.2 * size * random.between(0.85, 1.3), 0.08, 0.4),
+        "foot_width": np.clip(0.09 * size * random.between(0.85, 1.3), 0.04, 0.2),
+        "knee_bend": random.between(0.35, 0.9),
+        "actuators.hip.peak_torque": 110 * size**_POWER * random.strength(),
+        "actuators.hip.no_load_speed": 14 / np.sqrt(size) * random.between(0.9, 1.6),
+        "actuators.ankle.peak_torque": 55 * size**_POWER * random.strength(),
+        "actuators.ankle.no_load_speed": 14 / np.sqrt(size) * random.between(0.9, 1.6),
+    }
+
+
+def _humanoid(random: _Random) -> dict[str, Array]:
+    size = random.spread(0.8, 1.5)
+    torque = size**_POWER
+    lengths = {
+        "torso_length": 0.5,
+        "shoulder_width": 0.2,
+        "shoulder_depth": 0.15,
+        "upper_shoulder_length": 0.086,
+        "lower_shoulder_length": 0.12,
+        "upper_arm_length": 0.1,
+        "forearm_length": 0.106,
+        "lower_hip_length": 0.15,
+        "thigh_length": 0.2,
+        "shank_length": 0.2,
+        "foot_length": 0.2,
+        "foot_width": 0.085,
+        "foot_height": 0.06,
+    }
+    drawn = {name: value * size * random.between(0.9, 1.15) for name, value in lengths.items()}
+    speeds = {"large": 5.9, "medium": 10.3, "small": 11.5}
+    torques = {"large": 120.0, "medium": 72.0, "small": 24.0}
+    for name, peak in torques.items():
+        drawn[f"actuators.{name}.peak_torque"] = peak * torque * random.strength()
+        speed = speeds[name] / np.sqrt(size) * random.between(0.9, 2.2)
+        drawn[f"actuators.{name}.no_load_speed"] = speed
+        drawn[f"actuators.{name}.gear_ratio"] = 292.1 / speed
+    return drawn | {"knee_bend": random.between(0.25, 0.7)}
+
+
+KINDS: Mapping[str, Kind] = {
+    "quadruped": Kind(FOLDER / "quadruped", 0.4, _quadruped),
+    "hexapod": Kind(ROBOTS / "hexapod", 0.15, _hexapod),
+    "biped": Kind(ROBOTS / "biped", 0.2, _biped),
+    "biped_of_four": Kind(FOLDER / "biped_of_four", 0.1, _biped),
+    "humanoid": Kind(ROBOTS / "humanoid", 0.15, _humanoid),
+}
+
+
+def generate(count: int, seed: int = 0) -> list[Bodies]:
+    """Draw bodies of all kinds.
+
+    Args:
+        count: number of bodies, divided by the kinds' shares; at least one of each.
+        seed: seed of the draws.
+
+    Returns:
+        Bodies of each kind, in the order of `KINDS`.
+
+    Raises:
+        DraftError: too few draws of a kind pass.
+    """
+    return [
+        generate_kind(name, max(1, round(count * kind.share)), seed) for name, kind in KINDS.items()
+    ]
+
+
+def together(kinds: Sequence[Bodies]) -> Bodies:
+    """Bodies of all kinds as those of one training."""
+    return Bodies(
+        kinds[0].spec,
+        tuple(member for bodies in kinds for member in bodies.members),
+        tuple(text for bodies in kinds for text in bodies.texts),
+        "; ".join(bodies.note for bodies in kinds if bodies.note),
+    )
+
+
+def generate_kind(name: str, count: int, seed: int = 0) -> Bodies:
+    """Draw bodies of one kind, by its name in `KINDS`.
+
+    Raises:
+        DraftError: too few draws pass.
+    """
+    kind = KINDS[name]
+    base = load(kind.spec).resolve()
+    rng = np.random.default_rng([list(KINDS).index(name), seed])
+
+    def draw(start: int, size: int) -> dict[str, Array]:
+        drawn = kind.draw(_Random(rng, size))
+        for key, values in drawn.items():
+            bounds = getattr(base.spec.parameters.get(key), "bounds", None)
+            drawn[key] = np.clip(values, *bounds) if bounds is not None else values
+        return drawn
+
+    return draw_bodies(base, draw, count, _stands)
+
+
+def _stands(block: Design) -> Array:
+    """Whether the motors of designs hold them up in the home pose with a margin."""
+    from draft.metrics import of_design
+
+    return np.asarray(of_design(block, ["torque_margin"])["torque_margin"]) > _MARGIN

@@ -1,0 +1,267 @@
+"""Places of joints in one layout for all legs, and the numbers that describe a body there.
+
+A leg has a place by its side and by its order from front to rear, a joint of it one of six roles.
+A policy of all legs observes and moves joints by these slots, so that it does not depend on names,
+on the order of joints or on which way they turn. Joints that are on no leg, such as those of arms,
+have no slot: they hold the home pose.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.errors import DraftError
+from draft.learn.bodies.family_fields import family_fields
+from draft.learn.bodies.features import GRAVITY, MASS
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.bodies.payload import model_spec
+from draft.values import Array
+
+# The joint above the knee whose axis is most parallel with the knee's lifts the leg.
+ROLES = ("yaw", "roll", "pitch", "knee", "ankle pitch", "ankle roll")
+_YAW, _ROLL, _PITCH, _KNEE, _ANKLE_PITCH, _ANKLE_ROLL = range(len(ROLES))
+ROWS = ("front", "middle", "rear")
+LEGS = tuple(f"{side} {row}" for row in ROWS for side in ("left", "right"))
+SLOTS = len(LEGS) * len(ROLES)
+# Numbers of each joint, of each leg, and of the body; see `slot_features`.
+OF_JOINT = ("presence", "peak torque", "no-load speed", "inertia", "bend")
+OF_LEG = ("hip ahead", "hip aside", "foot ahead", "foot aside", "thigh")
+OF_BODY = ("leg length", "mass", "height", "legs", "sole")
+FEATURES = len(OF_JOINT) * SLOTS + len(OF_LEG) * len(LEGS) + len(OF_BODY)
+_UPRIGHT = 0.7  # Vertical part of an axis from which a joint turns the leg about the vertical.
+# A joint of a left leg counts as positive about an axis with a positive part along this.
+_POSITIVE = np.array([1.0, 0.8, 0.5])
+
+
+@dataclass(frozen=True)
+class Slots:
+    """Slots of a robot's joints and legs.
+
+    Attributes:
+        joints: slot of each joint; -1 for joints of no leg.
+        signs: for each joint, -1 if it turns against the direction that counts as positive.
+        legs: place of each leg among `LEGS`.
+    """
+
+    joints: tuple[int, ...]
+    signs: tuple[float, ...]
+    legs: tuple[int, ...]
+
+
+def mirrored_slots() -> NDArray[np.intp]:
+    """Slot on the other side, for each slot; the numbers of a mirrored pair have the same sign."""
+    places = np.arange(SLOTS).reshape(len(ROWS), 2, len(ROLES))
+    return places[:, ::-1].reshape(-1)
+
+
+def mirrored_features() -> NDArray[np.intp]:
+    """Index of the feature that the mirror image of a body has in its place, for each feature."""
+    joints = np.arange(len(OF_JOINT) * SLOTS).reshape(len(OF_JOINT), SLOTS)[:, mirrored_slots()]
+    legs = np.arange(len(OF_LEG) * len(LEGS)).reshape(len(OF_LEG), len(ROWS), 2)[..., ::-1]
+    body = np.arange(len(OF_BODY))
+    return np.concatenate(
+        [joints.ravel(), joints.size + legs.ravel(), joints.size + legs.size + body]
+    )
+
+
+def slots_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> Slots:
+    """Return the slots of a robot.
+
+    Args:
+        member: the robot.
+        model: its model; None to compile it.
+
+    Raises:
+        DraftError: a leg has more than three joints above its knee, or two below.
+    """
+    return _Pose(member, model).slots()
+
+
+def describe(member: LeggedRobot, model: mujoco.MjModel | None = None) -> tuple[Slots, Array]:
+    """Return the slots of a robot and its numbers by slots, shape (FEATURES,); see `slot_features`.
+
+    Args:
+        member: the robot.
+        model: its model; None to compile it.
+
+    Raises:
+        DraftError: as `slots_of`.
+    """
+    pose = _Pose(member, model)
+    slots = pose.slots()
+    return slots, pose.features(slots)
+
+
+class _Pose:
+    """A robot in its home pose."""
+
+    def __init__(self, member: LeggedRobot, model: mujoco.MjModel | None = None) -> None:
+        own: mujoco.MjModel = model or model_spec(member).compile()
+        data = mujoco.MjData(own)
+        data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+        data.qpos[7:] = member.home
+        mujoco.mj_kinematics(own, data)
+        ids = [own.joint(name).id for name in member.joints]
+        self.member, self.model = member, own
+        self.axes, self.anchors = data.xaxis[ids].copy(), data.xanchor[ids].copy()
+        self.feet = np.array([data.site_xpos[own.site(name).id] for name in member.feet])
+        self.inertia = own.dof_M0[[own.joint(name).dofadr[0] for name in member.joints]]
+        self.left = self.feet[:, 1] > 0
+
+    def knee(self, leg: int) -> int:
+        """Place of the knee among the joints of a leg."""
+        joints = list(self.member.leg_joints[leg])
+        return knee_of(np.array([*self.anchors[joints], self.feet[leg]]), self.axes[joints])[0]
+
+    def slots(self) -> Slots:
+        member = self.member
+        joints, signs = [-1] * len(member.joints), [1.0] * len(member.joints)
+        legs = [0] * len(member.feet)
+        for left in (True, False):
+            side = [leg for leg in range(len(legs)) if self.left[leg] == left]
+            side.sort(key=lambda leg: -self.feet[leg, 0])
+            for order, leg in enumerate(side):
+                legs[leg] = 2 * _row(order, len(side)) + (not left)
+        for leg, of_leg in enumerate(member.leg_joints):
+            chosen = _roles(member, self.axes[list(of_leg)], self.knee(leg), of_leg)
+            for joint, role in zip(of_leg, chosen, strict=True):
+                joints[joint] = legs[leg] * len(ROLES) + role
+                if self.left[leg]:
+                    signs[joint] = math.copysign(1.0, float(self.axes[joint] @ _POSITIVE))
+        for leg, of_leg in enumerate(member.leg_joints):
+            if not self.left[leg]:  # The mirror image of a joint counts alike.
+                for joint in of_leg:
+                    signs[joint] = signs[member.mirror[joint]] * member.mirror_sign[joint]
+        return Slots(tuple(joints), tuple(signs), tuple(legs))
+
+    def features(self, slots: Slots) -> Array:
+        member, length = self.member, self.member.leg_length
+        mass = member.mass
+        per_joint = np.zeros((len(OF_JOINT), SLOTS))
+        for joint, slot in enumerate(slots.joints):
+            if slot < 0:
+                continue
+            per_joint[:, slot] = (
+                1.0,
+                math.log(member.peak_torque[joint] / (mass * GRAVITY * length)),
+                math.log(member.no_load_speed[joint] * math.sqrt(length / GRAVITY)),
+                math.log(self.inertia[joint] / (mass * length**2)),
+                slots.signs[joint] * math.sin(member.home[joint]),
+            )
+        per_leg = np.zeros((len(OF_LEG), len(LEGS)))
+        middle = self.feet.mean(axis=0)
+        for leg, place in enumerate(slots.legs):
+            out = 1.0 if self.left[leg] else -1.0
+            joints = member.leg_joints[leg]
+            hip, knee = self.anchors[joints[0]], self.anchors[joints[self.knee(leg)]]
+            foot = self.feet[leg]
+            per_leg[:, place] = (
+                (hip[0] - middle[0]) / length,
+                out * hip[1] / length,
+                (foot[0] - middle[0]) / length,
+                out * foot[1] / length,
+                float(np.linalg.norm(foot - knee)) / length,
+            )
+        body = (
+            math.log(member.scale),
+            math.log(mass / member.scale**3 / MASS),
+            member.height / length,
+            len(member.feet) / 4,
+            self._sole() / length,
+        )
+        return np.concatenate([per_joint.ravel(), per_leg.ravel(), body])
+
+    def _sole(self) -> float:
+        """Half the length of a plate; 0 for spheres [m]."""
+        geom = self.model.geom(self.member.foot_geoms[0])
+        return float(geom.size[0]) if geom.type == mujoco.mjtGeom.mjGEOM_BOX else 0.0
+
+
+def slot_features(members: Sequence[LeggedRobot]) -> list[tuple[float, ...]]:
+    """Numbers of each body of one topology by slots, all without a unit, shape (FEATURES,).
+
+    With leg length L, mass m and gravity g, of each joint: one, and logarithms of peak torque per
+    m g L, of no-load speed times sqrt(L / g), and of the inertia about the joint per m L^2, and the
+    sine of its angle in the home pose. Of each leg, per L: place of hip and foot ahead of the
+    middle of the feet and aside, and the distance from knee to foot. Of the body: logarithms of
+    L per 0.48 m and of mass per 30 kg and cubed scale; height per L, a quarter of the number of
+    legs, and half the length of a sole per L. Numbers of slots without a joint are zero.
+
+    Raises:
+        DraftError: as `slots_of`.
+    """
+    if len(members) == 1:
+        return [tuple(describe(members[0])[1].tolist())]
+    first, fields = family_fields(tuple(members))
+    model, found = copy.copy(first), []
+    data = mujoco.MjData(model)
+    slots = None
+    for i, member in enumerate(members):
+        for name, values in fields.items():
+            getattr(model, name)[:] = values[i]
+        mujoco.mj_setConst(model, data)
+        pose = _Pose(member, model)
+        slots = slots or pose.slots()
+        found.append(tuple(pose.features(slots).tolist()))
+    return found
+
+
+def knee_of(points: Array, axes: Array) -> tuple[int, float]:
+    """Joint between the two long links of a leg, and its angle from the straight leg [rad].
+
+    Args:
+        points: anchors of the joints from the trunk outwards, and the foot, shape (joints + 1, 3).
+        axes: axes of the joints, shape (joints, 3).
+    """
+    links = np.diff(points, axis=0)
+    lengths = np.linalg.norm(links, axis=1)
+    knee = 1 + int(np.minimum(lengths[:-1], lengths[1:]).argmax()) if len(axes) > 1 else 0
+    if not knee:
+        return 0, 0.0
+    axis = axes[knee]
+    above, below = (one - axis * (one @ axis) for one in links[knee - 1 : knee + 1])
+    return knee, float(np.arctan2(axis @ np.cross(above, below), above @ below))
+
+
+def _row(order: int, count: int) -> int:
+    """Row of a leg by its order from the front among those of its side."""
+    if count == 1:
+        return 1
+    return 0 if order == 0 else 2 if order == count - 1 else 1
+
+
+def _roles(member: LeggedRobot, axes: Array, knee: int, joints: Sequence[int]) -> list[int]:
+    """Role of each joint of a leg, from the trunk outwards."""
+    found = [_KNEE] * len(joints)
+    along = abs(axes @ axes[knee])
+    if knee:
+        pitch = int(along[:knee].argmax())
+        found[pitch] = _PITCH
+        free = [_YAW, _ROLL]
+        rest = sorted(set(range(knee)) - {pitch}, key=lambda i: -abs(axes[i, 2]))
+        for i in rest:
+            if not free:
+                raise _too_many(member, joints, "above")
+            upright = abs(axes[i, 2]) > _UPRIGHT
+            found[i] = free.pop(free.index(_YAW) if upright and _YAW in free else -1)
+    free = [_ANKLE_ROLL, _ANKLE_PITCH]
+    for i in sorted(range(knee + 1, len(joints)), key=lambda i: -along[i]):
+        if not free:
+            raise _too_many(member, joints, "below")
+        alike = along[i] > _UPRIGHT and _ANKLE_PITCH in free
+        found[i] = free.pop(-1 if alike else 0)
+    return found
+
+
+def _too_many(member: LeggedRobot, joints: Sequence[int], side: str) -> DraftError:
+    names = ", ".join(member.joints[joint] for joint in joints)
+    most = 3 if side == "above" else 2
+    cause = f"{member.name} has a leg with more than {most} joints {side} its knee: {names}"
+    return DraftError(cause, "train a policy for this robot alone: 'draft train'")

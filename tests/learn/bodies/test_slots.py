@@ -1,0 +1,158 @@
+"""Slots of joints: the same for all legs, whatever joints are called or which way they turn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+import draft
+from draft.errors import DraftError
+from draft.learn.bodies.generated import KINDS, generate, generate_kind
+from draft.learn.bodies.legged import LeggedRobot, by_topology, legged_robot
+from draft.learn.bodies.padding import LAYOUTS, mirror_image, places, size
+from draft.learn.bodies.slots import (
+    FEATURES,
+    LEGS,
+    ROLES,
+    SLOTS,
+    describe,
+    mirrored_features,
+    mirrored_slots,
+    slot_features,
+    slots_of,
+)
+
+ROBOTS = {name: legged_robot(draft.load(name).resolve()) for name in ("quadruped", "humanoid")}
+ROBOTS |= {name: generate_kind(name, 1).members[0] for name in KINDS}
+
+
+def named(member: LeggedRobot) -> dict[str, str]:
+    """Slot of each joint in words, by its name."""
+    slots = slots_of(member).joints
+    return {
+        joint: f"{LEGS[slot // len(ROLES)]} {ROLES[slot % len(ROLES)]}"
+        for joint, slot in zip(member.joints, slots, strict=True)
+        if slot >= 0
+    }
+
+
+def test_joints_have_the_slots_of_their_place_and_role() -> None:
+    quadruped, hexapod = named(ROBOTS["quadruped"]), named(ROBOTS["hexapod"])
+    assert quadruped["FL_hip_roll"] == "left front roll"
+    assert quadruped["RR_knee"] == "right rear knee"
+    assert hexapod["LM_swing"] == "left middle yaw"
+    assert hexapod["RF_lift"] == "right front pitch"
+    four = named(ROBOTS["biped_of_four"])
+    assert list(four.values())[:4] == [
+        f"left middle {role}" for role in ("roll", "pitch", "knee", "ankle pitch")
+    ]
+    humanoid = named(ROBOTS["humanoid"])  # Pitch, roll and yaw, from the trunk outwards.
+    assert humanoid["left_hip_yaw"] == "left middle yaw"
+    assert humanoid["right_ankle_roll"] == "right middle ankle roll"
+    assert not any("shoulder" in name or "waist" in name for name in humanoid)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_no_two_joints_share_a_slot_and_mirrored_joints_have_mirrored_slots(name: str) -> None:
+    member = ROBOTS[name]
+    slots = slots_of(member)
+    used = [slot for slot in slots.joints if slot >= 0]
+    assert len(set(used)) == len(used)
+    mirror = mirrored_slots()
+    for joint, slot in enumerate(slots.joints):
+        other = member.mirror[joint]
+        assert slots.joints[other] == (mirror[slot] if slot >= 0 else -1)
+        if slot >= 0:
+            assert slots.signs[joint] * member.mirror_sign[joint] == slots.signs[other]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_body_that_is_its_own_mirror_image_has_mirrored_numbers(name: str) -> None:
+    (own,) = np.array(slot_features([ROBOTS[name]]))
+    assert own.shape == (FEATURES,)
+    assert own == pytest.approx(own[mirrored_features()], abs=1e-9)
+
+
+def test_the_order_of_joints_does_not_matter() -> None:
+    member = ROBOTS["quadruped"]
+    rng = np.random.default_rng(0)
+    order = rng.permutation(len(member.joints))
+    place = np.argsort(order)
+
+    def taken(values: tuple) -> tuple:
+        return tuple(values[i] for i in order)
+
+    joints = ("joints", "ranges", "peak_torque", "no_load_speed", "mirror_sign", "motor_heat")
+    other = replace(
+        member,
+        leg_joints=tuple(tuple(int(place[j]) for j in leg) for leg in member.leg_joints),
+        mirror=tuple(int(place[member.mirror[i]]) for i in order),
+        **{name: taken(getattr(member, name)) for name in joints},
+    )
+    # The model keeps its order: positions of joints are those of its text.
+    slots, known = slots_of(member), named(member)
+    assert tuple(slots_of(other).joints) == taken(slots.joints)
+    assert named(other) == known
+
+
+def test_numbers_of_a_family_are_those_of_each_body_alone() -> None:
+    first, second = generate_kind("quadruped", 2).members
+    numbers = np.array(slot_features([first, second]))
+    assert numbers == pytest.approx(np.array([describe(one)[1] for one in (first, second)]))
+
+
+def test_a_leg_with_too_many_joints_is_refused() -> None:
+    member = ROBOTS["biped"]
+    # Both legs as one: six joints above the last knee.
+    wrong = replace(member, leg_joints=(tuple(sum(member.leg_joints, ())),) * 2)
+    with pytest.raises(DraftError, match="more than"):
+        slots_of(wrong)
+
+
+@pytest.mark.parametrize("group", LAYOUTS)
+def test_the_mirror_image_of_the_mirror_image_is_the_observation(group: str) -> None:
+    source, sign = mirror_image(group)
+    values = np.random.default_rng(0).normal(size=size(group))
+    once = values[source] * sign
+    assert once[source] * sign == pytest.approx(values)
+    assert sorted(source) == list(range(size(group)))
+
+
+def test_entries_of_joints_without_a_slot_go_nowhere() -> None:
+    member = ROBOTS["humanoid"]
+    terms = [("joint_pos", len(member.joints)), ("base_lin_vel", 3)]
+    where = places("actor", terms, slots_of(member))
+    arm = member.joints.index("left_elbow")
+    assert where.entry[arm] == -1
+    assert where.entry[-3:].tolist() == [0, 1, 2]
+    source, _ = where.sources("actor")
+    assert (source < len(where.entry)).sum() == 12 + 3
+
+
+def test_generated_bodies_are_of_all_kinds_and_stand() -> None:
+    kinds = generate(20)
+    assert [len(one.members) for one in kinds] == [8, 3, 4, 2, 3]
+    members = [member for one in kinds for member in one.members]
+    assert [len(group) for group in by_topology(members)] == [8, 3, 4, 2, 3]
+    for one in kinds:
+        for text in one.texts:
+            assert one.spec.resolve(yaml.safe_load(text)["values"]).accepted
+
+
+def test_equal_seeds_draw_equal_bodies_and_others_do_not() -> None:
+    first, again, other = (generate_kind("biped", 2, seed).members for seed in (3, 3, 4))
+    assert first == again
+    assert first[0] != other[0]
+
+
+def test_knees_away_from_each_other_are_kept_for_tests() -> None:
+    members = generate_kind("quadruped", 40).members
+    bends = {
+        tuple(np.sign([member.home[member.joints.index(f"{leg}_knee")] for leg in ("FL", "RL")]))
+        for member in members
+    }
+    assert bends == {(-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)}
+    assert SLOTS == 36

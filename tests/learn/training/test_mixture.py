@@ -1,0 +1,180 @@
+"""One policy learns from robots of several topologies, and becomes a small one for each of them."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("mjlab")
+
+import draft  # noqa: E402
+from draft.errors import DraftError  # noqa: E402
+from draft.learn.bodies.generated import generate, together  # noqa: E402
+from draft.learn.bodies.legged import by_topology, kind_of, legged_robot  # noqa: E402
+from draft.learn.bodies.slots import SLOTS, slots_of  # noqa: E402
+from draft.learn.engine.machine import obstacle  # noqa: E402
+from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
+from draft.learn.task.recipes import ANY  # noqa: E402
+from draft.learn.task.world.access import robot_of  # noqa: E402
+from draft.learn.training.ppo.legs_onnx import export_legs  # noqa: E402
+from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
+from draft.learn.training.ppo.worlds import Worlds  # noqa: E402
+from draft.learn.training.run import Plan, Run, open_run  # noqa: E402
+from tests.learn.runs import begin, train, weights  # noqa: E402
+from tests.learn.small import SMALL  # noqa: E402
+
+if obstacle() is not None:
+    pytest.skip("needs mjbatch", allow_module_level=True)
+
+
+def plan(**more: object) -> Plan:
+    """A plan with bodies of all kinds."""
+    members = together(generate(10)).members
+    config = ANY.config.with_values(SMALL)
+    numbers = {"environments": 10, "ground": "flat", "see_design": True, "see_ground": False}
+    return Plan(members, "any", config=config, **{**numbers, **more})  # pyright: ignore[reportArgumentType]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    found = begin(tmp_path_factory.mktemp("mixture") / "run", plan())
+    train(found, 2, engine="native")
+    return found
+
+
+@pytest.fixture(scope="module")
+def legs(run: Run) -> LegsPolicy:
+    export_legs(run, run.folder / "legs.onnx")
+    return open_legs_policy(run.folder / "legs.onnx")
+
+
+def test_a_run_keeps_robots_of_several_topologies(run: Run) -> None:
+    opened = open_run(run.folder).plan
+    assert opened == run.plan
+    assert opened.mixed
+    assert len(by_topology(opened.members)) == 5
+    row = (run.folder / "progress.csv").read_text(encoding="utf-8").splitlines()[0]
+    for members in by_topology(opened.members):
+        assert f"{kind_of(members)}/tracking_error" in row
+
+
+def test_a_resumed_training_is_the_same_bit_by_bit(tmp_path: Path) -> None:
+    whole, parts = (begin(tmp_path / name, plan()) for name in ("whole", "parts"))
+    first, second = train(whole, 4, engine="native"), train(parts, 1, 4, engine="native")
+    for name, values in weights(first).items():
+        assert torch.equal(values, weights(second)[name]), name
+
+
+def test_actions_of_absent_joints_are_not_learnt(run: Run) -> None:
+    trainer = Trainer(open_run(run.folder), "cpu", engine="native")
+    present = trainer.runner.alg._present  # pyright: ignore[reportAttributeAccessIssue]
+    absent = present.sum(0) == 0
+    assert 0 < int(absent.sum()) < SLOTS
+    last = trainer.runner.alg.get_policy().mlp[-1]
+    first = Trainer(begin(run.folder.with_name("first"), plan()), "cpu", engine="native")
+    before = first.runner.alg.get_policy().mlp[-1]
+    assert torch.equal(last.weight[absent], before.weight[absent])
+    assert not torch.equal(last.weight[~absent], before.weight[~absent])
+
+
+def test_the_small_network_of_each_robot_gives_the_same_actions(run: Run, legs: LegsPolicy) -> None:
+    with contextlib.redirect_stdout(io.StringIO()):
+        worlds = Worlds(run.plan, "cpu", "native", 0, 1)
+    padded = worlds.wrapped.get_observations()["actor"]
+    start = 0
+    for env in worlds.envs:
+        # The noise of observations is drawn again: compare without it.
+        robot, manager = robot_of(env), env.observation_manager
+        for world in range(env.num_envs):
+            member = robot.cfg.members[robot.host_member[world]]
+            small, slots = legs.of_robot(member), slots_of(member)
+            entries = padded[start + world].numpy()
+            own = _own(member, entries, slots)
+            wide = legs.network(entries)
+            wanted = [
+                sign * wide[slot] if slot >= 0 else 0.0
+                for slot, sign in zip(slots.joints, slots.signs, strict=True)
+            ]
+            assert small(own) == pytest.approx(np.array(wanted), abs=1e-5)
+        start += env.num_envs
+        assert manager is not None
+    worlds.close()
+
+
+def _own(member, entries, slots):
+    """A robot's own observation for padded entries, by a calculation of its own."""
+    length = member.leg_length
+    speed, time = np.sqrt(9.81 * length), np.sqrt(length / 9.81)
+    lin, ang, gravity, command = (entries[i : i + 3] for i in (0, 3, 6, 9))
+    joints = entries[12 : 12 + 3 * SLOTS].reshape(3, SLOTS)
+    rows = np.zeros((3, len(member.joints)))
+    for joint, (slot, sign) in enumerate(zip(slots.joints, slots.signs, strict=True)):
+        if slot >= 0:
+            rows[:, joint] = sign * joints[:, slot] / np.array([1.0, time, 1.0])
+    commanded = command * [speed, speed, 1 / time]
+    return np.concatenate([lin * speed, ang / time, gravity, *rows, commanded])
+
+
+def test_the_mirror_image_of_an_observation_gives_mirrored_actions(legs: LegsPolicy) -> None:
+    member = legged_robot(draft.load("humanoid").resolve())
+    policy = legs.of_robot(member)
+    rng = np.random.default_rng(0)
+    count = len(member.joints)
+    seen = rng.normal(size=9 + 3 * count + 3)
+    mirror, sign = np.array(member.mirror), np.array(member.mirror_sign)
+
+    def image(values: np.ndarray) -> np.ndarray:
+        return values[mirror] * sign
+
+    lin, ang, gravity = (seen[i : i + 3] for i in (0, 3, 6))
+    rows = seen[9 : 9 + 3 * count].reshape(3, count)
+    other = np.concatenate(
+        [
+            lin * [1, -1, 1],
+            ang * [-1, 1, -1],
+            gravity * [1, -1, 1],
+            *(image(row) for row in rows),
+            seen[-3:] * [1, -1, -1],
+        ]
+    )
+    assert policy(other) == pytest.approx(image(policy(seen)), abs=1e-5)
+
+
+def test_a_robot_outside_the_training_counts_as_the_nearest_inside(legs: LegsPolicy) -> None:
+    member = legged_robot(draft.load("quadruped").resolve())
+    strong = replace(member, peak_torque=tuple(100 * x for x in member.peak_torque))
+    assert np.abs(legs.outside(strong)).max() > 1
+    seen = np.zeros(9 + 3 * 12 + 3)
+    assert np.isfinite(legs.of_robot(strong)(seen)).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda data: data[: len(data) // 2], "truncated"),
+        (lambda data: data.replace(b"layout", b"layuot"), "drives the joints of one kind"),
+        (lambda _: b"", "not a policy"),
+    ],
+)
+def test_a_file_that_is_no_such_policy_is_refused(
+    run: Run, legs: LegsPolicy, tmp_path: Path, change, words: str
+) -> None:
+    file = tmp_path / "broken.onnx"
+    file.write_bytes(change(legs.file.read_bytes()))
+    with pytest.raises(DraftError, match=words):
+        open_legs_policy(file)
+
+
+def test_a_run_of_one_topology_is_exported_otherwise(tmp_path: Path) -> None:
+    members = generate(10)[0].members
+    single = begin(
+        tmp_path / "run", replace(plan(), members=members, stage="base", see_design=False)
+    )
+    with pytest.raises(DraftError, match="a run of one topology"):
+        export_legs(single, tmp_path / "legs.onnx")
