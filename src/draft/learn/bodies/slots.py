@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from draft.errors import DraftError
 from draft.learn.bodies.family_fields import family_fields
 from draft.learn.bodies.features import GRAVITY, MASS
+from draft.learn.bodies.knees import knee_of
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.bodies.payload import model_spec
 from draft.values import Array
@@ -211,23 +212,6 @@ def slot_features(members: Sequence[LeggedRobot]) -> list[tuple[float, ...]]:
         slots = slots or pose.slots()
         found.append(tuple(pose.features(slots).tolist()))
     return found
-
-
-def knee_of(points: Array, axes: Array) -> tuple[int, float]:
-    """Joint between the two long links of a leg, and its angle from the straight leg [rad].
-
-    Args:
-        points: anchors of the joints from the trunk outwards, and the foot, shape (joints + 1, 3).
-        axes: axes of the joints, shape (joints, 3).
-    """
-    links = np.diff(points, axis=0)
-    lengths = np.linalg.norm(links, axis=1)
-    knee = 1 + int(np.minimum(lengths[:-1], lengths[1:]).argmax()) if len(axes) > 1 else 0
-    if not knee:
-        return 0, 0.0
-    axis = axes[knee]
-    above, below = (one - axis * (one @ axis) for one in links[knee - 1 : knee + 1])
-    return knee, float(np.arctan2(axis @ np.cross(above, below), above @ below))
 
 
 def _row(order: int, count: int) -> int:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.learn.bodies.slots import knee_of
+from draft.learn.bodies.knees import knee_of
 
 if TYPE_CHECKING:
     import mujoco

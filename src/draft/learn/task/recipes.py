@@ -125,7 +125,6 @@ ANY = Recipe(
         "learning.environments": Change(1024, "some 200 of each topology"),
         "learning.iterations_any": Change(2500, "60 million steps"),
         "learning.entropy": Change(0.005, "its sum over the joints is that of twelve for most"),
-        "learning.decay": Change(0.3, "the last steps no longer explore"),
         "velocity.forward": Change(2.17, "sqrt(g L)"),
         "velocity.sideways": Change(0.5, "0.23 sqrt(g L)"),
         "velocity.turn": Change(1.5, "0.33 sqrt(g / L)"),
@@ -135,10 +134,6 @@ ANY = Recipe(
         "velocity.pushed": Change(0.2, "one policy also learns to survive kicks"),
         "rewards.linear_sigma": Change(0.35, "slow commands are followed, not ignored"),
         "rewards.power_weight": Change(-0.05, "joints that shake cost power"),
-        "episodes.contact_time": Change((0.01, 0.01), "stiffer feet than the published"),
-        "episodes.delay": Change((0.0, 0.015), "targets reach real motors late"),
-        "episodes.motor": Change((0.95, 1.05), "no two motors are alike"),
-        "episodes.joint_friction": Change((0.0, 0.02), "no joint is free of it"),
     },
     LAPTOP.plane,
 )
