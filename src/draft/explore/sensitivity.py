@@ -263,8 +263,9 @@ def _measured(many: Design, metrics: Sequence[str]) -> Array:
 
         batch = build_batch(many, np.flatnonzero(np.broadcast_to(many.accepted, count)))
         for name, values in of_batch(batch, rest).items():
-            found[name] = np.full(count, np.nan)
-            found[name][batch.rows] = values
+            of_all = np.full(count, np.nan)
+            of_all[batch.rows] = values
+            found[name] = of_all
     return np.array([np.broadcast_to(found[name], count) for name in metrics], float)
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import io
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,7 +40,7 @@ def plan(**more: object) -> Plan:
     members = together(generate(10)).members
     config = ANY.config.with_values(SMALL)
     numbers = {"environments": 10, "ground": "flat", "see_design": True, "see_ground": False}
-    return Plan(members, "any", config=config, **{**numbers, **more})  # pyright: ignore[reportArgumentType]
+    return Plan(members, "any", config=config, **{**numbers, **more})
 
 
 @pytest.fixture(scope="module")
@@ -76,9 +78,9 @@ def test_actions_of_absent_joints_are_not_learnt(run: Run) -> None:
     present = trainer.runner.alg._present  # pyright: ignore[reportAttributeAccessIssue]
     absent = present.sum(0) == 0
     assert 0 < int(absent.sum()) < SLOTS
-    last = trainer.runner.alg.get_policy().mlp[-1]
+    last: Any = trainer.runner.alg.get_policy().mlp[-1]
     first = Trainer(begin(run.folder.with_name("first"), plan()), "cpu", engine="native")
-    before = first.runner.alg.get_policy().mlp[-1]
+    before: Any = first.runner.alg.get_policy().mlp[-1]
     assert torch.equal(last.weight[absent], before.weight[absent])
     assert not torch.equal(last.weight[~absent], before.weight[~absent])
 
@@ -89,8 +91,7 @@ def test_the_small_network_of_each_robot_gives_the_same_actions(run: Run, legs: 
     padded = worlds.wrapped.get_observations()["actor"]
     start = 0
     for env in worlds.envs:
-        # The noise of observations is drawn again: compare without it.
-        robot, manager = robot_of(env), env.observation_manager
+        robot = robot_of(env)
         for world in range(env.num_envs):
             member = robot.cfg.members[robot.host_member[world]]
             small, slots = legs.of_robot(member), slots_of(member)
@@ -103,7 +104,6 @@ def test_the_small_network_of_each_robot_gives_the_same_actions(run: Run, legs: 
             ]
             assert small(own) == pytest.approx(np.array(wanted), abs=1e-5)
         start += env.num_envs
-        assert manager is not None
     worlds.close()
 
 
@@ -163,7 +163,7 @@ def test_a_robot_outside_the_training_counts_as_the_nearest_inside(legs: LegsPol
     ],
 )
 def test_a_file_that_is_no_such_policy_is_refused(
-    run: Run, legs: LegsPolicy, tmp_path: Path, change, words: str
+    legs: LegsPolicy, tmp_path: Path, change: Callable[[bytes], bytes], words: str
 ) -> None:
     file = tmp_path / "broken.onnx"
     file.write_bytes(change(legs.file.read_bytes()))

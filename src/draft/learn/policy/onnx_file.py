@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from draft.errors import DraftError
 
@@ -88,9 +88,9 @@ class Network:
 
 
 def of_layers(
-    mean: Array,
-    divisor: Array,
-    layers: Sequence[tuple[Array, Array]],
+    mean: ArrayLike,
+    divisor: ArrayLike,
+    layers: Sequence[tuple[ArrayLike, ArrayLike]],
     metadata: Mapping[str, str],
 ) -> Network:
     """Make a network from what `Network.layers` returns.
@@ -101,7 +101,7 @@ def of_layers(
         layers: weights, shape (outputs, inputs), and bias, shape (outputs,), of each layer.
         metadata: metadata as text by key.
     """
-    weights = {"mean": mean, "divisor": divisor}
+    weights: dict[str, ArrayLike] = {"mean": mean, "divisor": divisor}
     steps: list[tuple[Callable[..., Array], tuple[str, ...], str]] = [
         (np.subtract, ("input", "mean"), "centred"),
         (np.divide, ("centred", "divisor"), "0"),
@@ -112,7 +112,7 @@ def of_layers(
         if i + 1 < len(layers):
             steps.append((_elu, (f"sum {i}",), str(i + 1)))
     single = {name: np.asarray(values, np.float32) for name, values in weights.items()}
-    return Network(len(mean), metadata, tuple(steps), single, "input", steps[-1][2])
+    return Network(len(single["mean"]), metadata, tuple(steps), single, "input", steps[-1][2])
 
 
 def read(path: Path) -> Network:

@@ -139,8 +139,8 @@ def any_legs(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
     for name in ("action_rate", "joint_limits"):
         terms[name].weight *= share
     if len(member.feet) == 2:
-        largest = v.forward * _ON_TWO_LEGS, v.sideways * _ON_TWO_LEGS, v.turn
-        command.set_largest(*map(Scaled, largest), task)
+        forward, sideways = (Scaled(_ON_TWO_LEGS * most) for most in (v.forward, v.sideways))
+        command.set_largest(forward, sideways, Scaled(v.turn), task)
     if v.progress:
         gate = scaled(numbers, "clearance_gate")
         terms["progress"] = RewardTermCfg(

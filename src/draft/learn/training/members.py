@@ -42,7 +42,7 @@ def files_of(members: Sequence[LeggedRobot]) -> dict[str, str | bytes]:
             arrays[_nth("numbers", k)] = np.stack([text.numbers for text in own])
         if len(templates) > 1:
             arrays["of"] = np.array([templates.index(member.text.template) for member in members])
-        np.savez_compressed(content, **arrays)
+        np.savez_compressed(content, **arrays)  # pyright: ignore[reportArgumentType]
         files[NUMBERS] = content.getvalue()
     return files
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.learn.bodies.designs import Bodies, draw_bodies
@@ -209,7 +210,7 @@ def generate_kind(name: str, count: int, seed: int = 0) -> Bodies:
     return draw_bodies(base, draw, count, _stands)
 
 
-def _stands(block: Design) -> Array:
+def _stands(block: Design) -> NDArray[np.bool_]:
     """Whether the motors of designs hold them up in the home pose with a margin."""
     from draft.metrics import of_design
 

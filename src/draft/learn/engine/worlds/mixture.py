@@ -78,7 +78,7 @@ class Mixture(VecEnv):
         return images | {"actions": flip(mirrored_slots(), np.ones(SLOTS))}
 
     def _joined(self, seen: Sequence[TensorDict]) -> TensorDict:
-        return torch.cat(list(seen))  # pyright: ignore[reportReturnType, reportArgumentType]
+        return torch.cat(list(seen))  # pyright: ignore[reportReturnType]
 
 
 class _Part:

@@ -59,13 +59,13 @@ def export_legs(run: Run, path: Path, iteration: int | None = None) -> None:
         if not last:
             nodes.append(helper.make_node("Elu", [out], [f"x{k + 1}"], alpha=1.0))
     sizes = {"obs": len(weights["mean"]), "actions": len(weights[f"bias{len(layers) - 1}"])}
-    ends = [
+    seen, actions = (
         [helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, [1, count])]
         for name, count in sizes.items()
-    ]
+    )
     tensors = [numpy_helper.from_array(values, name) for name, values in weights.items()]
     model = helper.make_model(
-        helper.make_graph(nodes, "legs", *ends, tensors),
+        helper.make_graph(nodes, "legs", seen, actions, tensors),
         opset_imports=[helper.make_opsetid("", 18)],
     )
     helper.set_model_props(model, _metadata(run, number))

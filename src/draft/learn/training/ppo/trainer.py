@@ -175,8 +175,8 @@ class Trainer:
         with torch.inference_mode():
             for _ in range(self._numbers["num_steps_per_env"]):
                 seen, rewards, dones, extras = self._wrapped.step(alg.act(seen))
-                for values in seen.values():
-                    finite &= values.isfinite().all()
+                for group in seen.keys():  # noqa: SIM118, a TensorDict iterates over rows.
+                    finite &= seen[group].isfinite().all()
                 alg.process_env_step(seen, rewards, dones, extras)
                 self._worlds.add(rewards, dones, extras)
             alg.compute_returns(seen)
