@@ -115,9 +115,8 @@ class DesignComparison:
 def _limits(found: Sequence[Limit]) -> dict[str, Any]:
     """The limit that binds, the next one, and how far that is."""
     first, *others = [one._asdict() | {"joints": list(one.joints)} for one in found[:2]]
-    after = others[0] if others else None
-    margin = None if after is None else abs(after["value"] - first["value"])
-    return {**first, "next": after, "margin": margin}
+    margin = abs(found[1].value - found[0].value) if others else None
+    return {**first, "next": others[0] if others else None, "margin": margin}
 
 
 def unique(names: Sequence[str]) -> tuple[str, ...]:
