@@ -22,7 +22,7 @@ from draft.studio.library import Library
 from draft.studio.server import Studio
 
 MOVES = 60
-EFFECT_ON = "jump_height"  # Of the metrics, the one that takes longest.
+EFFECT_ON = "payload_rated"  # Which all sliders of legs and trunk change, in both robots.
 EFFECTS = """[...document.querySelectorAll('label')].map((one) => one.textContent)
   .filter((text) => /[▲▼]/.test(text)).join()"""
 SECONDS = 5.0  # of walking before the moves [s]
