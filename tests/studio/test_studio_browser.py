@@ -259,6 +259,7 @@ def test_a_pinned_design_has_a_tab_that_says_why_the_design_differs(
     tab.wait_for_selector("#ds-compared")
     session = shown._session
     until(lambda: session.design.parameters["thigh_length"] == pytest.approx(0.26))
+    assert session.pinned is not None
     designs = (session.pinned.design, session.design)
     found = draft.compare(designs, ["mass", "jump_height"], names=("pinned", "now"))
     for row in section(found, found.metrics).summary.rows:

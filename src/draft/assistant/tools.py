@@ -195,11 +195,11 @@ def save_design(
 
 
 @tool(
-    {"designs": dict, "against_first": list, "findings_alone": dict},
+    {"designs": dict, "against_first": list, "limits": dict, "findings_alone": dict},
     "compare fewer designs, or name fewer metrics by `metrics`",
 )
 def compare(folder: Folder, designs: References, metrics: Metrics = (), seed: Seed = 0) -> Record:
-    """Compare designs with the first: metrics, and what each changed number contributes.
+    """Compare designs with the first: metrics, what each changed number contributes, what limits.
 
     better is the probability that a design is better in a metric, given the errors of the laws.
     """

@@ -114,12 +114,9 @@ class DesignComparison:
 
 def _limits(found: Sequence[Limit]) -> dict[str, Any]:
     """The limit that binds, the next one, and how far that is."""
-    first, after = (
-        one._asdict() | {"joints": list(one.joints)} if one is not None else None
-        for one in (found[0], found[1] if len(found) > 1 else None)
-    )
-    margin = abs(found[1].value - found[0].value) if len(found) > 1 else None
-    return {**(first or {}), "next": after, "margin": margin}
+    first, *others = [one._asdict() | {"joints": list(one.joints)} for one in found[:2]]
+    margin = abs(found[1].value - found[0].value) if others else None
+    return {**first, "next": others[0] if others else None, "margin": margin}
 
 
 def unique(names: Sequence[str]) -> tuple[str, ...]:
