@@ -26,7 +26,8 @@ _SIDES = ((BLUE, "more"), (ORANGE, "less"))
 def tornado(found: Sensitivity) -> Figure:
     """Draw the changes of metrics for a step more (blue) and a step less (orange) of each number.
 
-    Black lines are the 90 % bands over the errors of the laws, for a step more.
+    Black lines are the 90 % bands over the errors of the laws, for a step more; of learned metrics
+    the 95 % intervals over roll-outs.
     """
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
@@ -40,8 +41,8 @@ def tornado(found: Sensitivity) -> Figure:
         axes.axis("off")
     for k, (axes, name) in enumerate(zip(panels, found.metrics, strict=False)):
         metric = find(name)
-        size = np.fmax(abs(found.step_up[:, k]), abs(found.step_down[:, k]))
-        order = [i for i in np.argsort(-np.nan_to_num(size), kind="stable") if size[i] > 0]
+        size = found.sizes[:, k]
+        order = [i for i in np.argsort(-size, kind="stable") if size[i] > 0]
         order = order[:_MOST][::-1]
         place = np.arange(len(order))
         for values, color in ((found.step_up, BLUE), (found.step_down, ORANGE)):
