@@ -21,7 +21,7 @@ from draft.learn.measuring.evaluation_options import BodyRollOuts
 from draft.learn.measuring.learned_metrics import speeds
 from draft.learn.measuring.paired_metrics import Paired, paired
 from draft.learn.measuring.policies import Source, open_source
-from draft.values import Array, Value, brief
+from draft.values import Array, Value
 
 _TWO_SIDED = 0.975
 
@@ -80,7 +80,7 @@ def learned_effects(
     many = design.spec.resolve(design.values, arrays)
     measured = np.flatnonzero(np.concatenate([[True], known.ravel()]))
     rollouts = BodyRollOuts.of({"replicas": settings.replicas, "seed": seed})
-    found = paired(source, many, names, rollouts, settings.progress or _silent, measured)
+    found = paired(source, many, names, rollouts, settings.progress or silent, measured)
     table = np.array([found.values[name] for name in names])  # (M, 1 + 2P)
     resampled = np.array([found.resampled[name] for name in names])
     for name, value in zip(names, table[:, 0], strict=True):
@@ -124,13 +124,11 @@ def quantile(replicas: int, share: float) -> float:
     return float(t.ppf(share, replicas - 1))
 
 
-def _silent(done: int, of: int) -> None:
-    pass
+def silent(done: int, of: int) -> None:
+    """Report nothing."""
 
 
-def _notes(
-    source: Source, found: Paired, names: Sequence[str], replicas: int
-) -> tuple[str, ...]:
+def _notes(source: Source, found: Paired, names: Sequence[str], replicas: int) -> tuple[str, ...]:
     """Sentences on the roll-outs, the region of the policy, its commands, and what has none."""
     labels = [f"{name} {sign}" for sign in ("up", "down") for name in names]
     base, *_ = found.members.values()

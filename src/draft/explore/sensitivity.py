@@ -117,7 +117,6 @@ class Sensitivity:
 
     def record(self) -> dict[str, object]:
         """Plain data; None where there is no number."""
-
         by_rollouts = self.learned.any()
 
         def row(values: Array) -> dict[str, float | None]:
