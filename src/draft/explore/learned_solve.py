@@ -1,11 +1,13 @@
 """The nearest design that meets conditions on learned metrics: a screen first, roll-outs last.
 
-Conditions in closed form are screened by arrays. A first batch of designs around the nearest that
-meets them is rolled out, and linear predictions of the learned conditions, and of the features
-that bound the policy's region, are fitted to the results. Each round searches by the predictions,
-rolls out designs around what it finds and between there and the given design, and fits again with
-more weight on near ones. Only designs that were rolled out are solutions. All bodies have the same
-noise, starts and kicks.
+Conditions in closed form and the policy's region are screened first. A batch of designs around the
+nearest that meets them is rolled out, and linear predictions of the learned conditions are fitted
+to the results. Each round searches by the predictions, rolls out designs around what it finds and
+between there and the given design, and fits again with more weight on near ones. Only designs that
+were rolled out are solutions.
+
+All bodies have the same noise, starts and kicks. The given design is rolled out more often, and the
+others are judged by their differences from it, in which most of what chance does cancels.
 """
 
 from __future__ import annotations
@@ -19,27 +21,30 @@ from numpy.typing import NDArray
 from draft.design import Design
 from draft.errors import DraftError
 from draft.explore.goals import Constraint
-from draft.explore.learned_effects import open_policy, quantile, silent
+from draft.explore.learned_effects import open_policy, silent
 from draft.explore.settings import TargetSettings
 from draft.explore.solve import Conflict, Search, Solution, by_rollouts
 from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.measuring.evaluation_options import BodyRollOuts
+from draft.learn.measuring.learned_metrics import walkers
 from draft.learn.measuring.paired_metrics import RESAMPLES, paired
 from draft.metrics import of_design
 from draft.values import Array, Value
 from draft.variation.axes import Axis
 
 _INSIDE = "learned.inside"
-_FIRST, _EACH, _ROUNDS = 24, 20, 3  # Bodies of the first batch and of each round; rounds.
+_FIRST, _EACH, _ROUNDS = 22, 14, 3  # Bodies of the first batch and of each round; rounds.
 _LAST = 3  # Batches of a solution with one number as it was.
-_SCREENED = 512  # Designs of which the first batch is taken.
-_ONE_SIDED = 0.95
+_SCREENED, _WALKING = 1024, 128  # Designs screened for the first batch; those of them for a region.
+_BASE = 16  # Roll-outs of the given design, over those of others.
+_SURE = 1.645  # Standard deviations that a normal number exceeds in 5 % of cases.
 _NOISE = 1e-2  # Standard deviation of a gap by roll-outs, over that of its slopes.
 _NEAR = 0.1  # Least distance over which predictions are fitted.
 _WIDTH, _SHRINK = 0.3, 0.6  # Of a round's designs around its target, over its change.
 _PULLS = (1.0, 1.08, 0.92, 1.2, 0.84, 0.7)
 _WORST = 1.0  # Gap of a robot that falls.
+_ONLY_FIRST = np.array([0])
 
 
 class _Rolled(NamedTuple):
@@ -48,19 +53,15 @@ class _Rolled(NamedTuple):
     Attributes:
         drawn: their numbers, shape (N, numbers).
         gap: gap of each learned condition, above zero where it is not met, shape (N, conditions).
-        margin: what it has to be below zero by to be sure, same shape.
+        deviation: standard deviation of the gap by chance, same shape.
         closed: violation of the conditions in closed form, shape (N,).
-        inside: whether they are in the policy's region, shape (N,).
-        features: their features, shape (N, features).
         values: learned metrics, shape (N, metrics).
     """
 
     drawn: Array
     gap: Array
-    margin: Array
+    deviation: Array
     closed: Array
-    inside: NDArray[np.bool_]
-    features: Array
     values: Array
 
 
@@ -85,9 +86,11 @@ class RolledOutSearch(Search):
         named = {name for one in self._learned for name in one.holds.metrics}
         self._names = (*sorted(named - {*self._metrics, _INSIDE}), _INSIDE)
         self._outside = self._source.warning(legged_robot(design))
+        self._done, self._base, self._own = 0, {}, {}
+        count = len(axes)
         self._rolled: _Rolled | None = None
-        self._fit = np.zeros((0, 0))
-        self._done = 0
+        self._seen = np.zeros((0, count)), np.zeros((0, len(self._source.region.low)))
+        self._fits: tuple[Array, ...] = ()
 
     def run(self) -> Solution:
         """Search, and explain."""
@@ -97,7 +100,8 @@ class RolledOutSearch(Search):
             centre, violation = self._nearest(self._closed)
             if violation.any():  # No roll-out can help.
                 return Search(self._design, self._closed, self._axes, self._rng).run()
-        rolled = self._roll(np.concatenate([zero, centre[None], self._spread(centre)]))
+        first = np.concatenate([zero, centre[None] if centre.any() else zero[:0]])
+        rolled = self._roll(np.concatenate([first, self._spread(centre)]))
         if np.isnan(rolled.values[0]).any():
             missing = [
                 name for name, x in zip(self._names, rolled.values[0], strict=True) if np.isnan(x)
@@ -109,11 +113,12 @@ class RolledOutSearch(Search):
         target = centre
         for k in range(_ROUNDS):
             best = self._best()
-            self._predict_around(target if best is None else best)
+            centre = self._least() if best is None else best
+            self._predict_around(centre)
             target, violation = self._nearest(self._conditions)
             if not violation.any():
                 target = self._tidied(target)
-            self._roll(self._around(target, best, _WIDTH * _SHRINK**k))
+            self._roll(self._around(target, centre, _WIDTH * _SHRINK**k))
         best = self._best()
         if best is None:
             known = tuple(one.text for one in self._conditions if one.text != "accepted")
@@ -146,82 +151,92 @@ class RolledOutSearch(Search):
         )
 
     def _spread(self, centre: Array) -> Array:
-        """Accepted designs around one in rising distance, those that meet the conditions first."""
-        size = self._rng.uniform(0.05, 0.5, (_SCREENED, 1))
+        """Designs around one in rising distance that meet the conditions in closed form."""
+        size = self._rng.uniform(0.03, 0.4, (_SCREENED, 1))
         drawn = self._inside(centre + size * self._rng.uniform(-1, 1, (_SCREENED, len(centre))))
-        violation = self._violations(drawn, self._closed)
-        met = violation.sum(axis=1) == 0
-        accepted = violation[:, -1] == 0  # The last condition, see `solve`.
-        for chosen in (met, accepted):
-            if chosen.sum() >= _FIRST:
-                break
-        drawn = drawn[chosen]
-        order = np.argsort(((drawn - centre) ** 2).sum(axis=1), kind="stable")
-        return drawn[order[np.unique(np.linspace(0, len(order) - 1, _FIRST - 2).astype(int))]]
+        drawn = self._walking(_evenly(self._screened(drawn), centre, _WALKING))
+        return _evenly(drawn, centre, _FIRST)
 
-    def _around(self, target: Array, best: Array | None, width: float) -> Array:
-        """Designs of a round that meet the conditions in closed form."""
+    def _around(self, target: Array, centre: Array, width: float) -> Array:
+        """Designs of a round: around a target, and between a known design and the given one."""
         rows = [target * pull for pull in _PULLS]
-        if best is not None:
-            rows += [best * pull for pull in (0.97, 0.92, 0.85)] + [(best + target) / 2]
-        aside = self._rng.normal(0, width, (4 * _EACH, len(target))) * (target != 0)
-        rows += [*(target * (1 + aside))]
-        aside = self._rng.normal(0, width, aside.shape) * np.sqrt(np.mean(target**2))
-        rows += [*(target + aside * (self._rng.random(aside.shape) < 0.3))]
-        drawn = np.unique(self._inside(np.array(rows)), axis=0, return_index=True)[1]
-        drawn = self._inside(np.array(rows))[np.sort(drawn)]
-        drawn = drawn[(self._places(drawn) < 0) & drawn.any(axis=1)]
+        rows += [centre * pull for pull in (0.95, 0.85, 0.7)] + [(centre + target) / 2]
+        rows = [row for row in rows if row.any()]
+        scale = np.sqrt(np.mean(target**2))
+        shape = (2 * _EACH, len(target))
+        for middle in (target, centre):
+            aside = self._rng.normal(0, width, shape) * np.maximum(abs(middle), scale / 2)
+            rows += [*(middle + aside * (self._rng.random(shape) < 0.5))]
+        drawn = self._walking(self._screened(self._inside(np.array(rows))))
+        drawn = drawn[np.sort(np.unique(drawn, axis=0, return_index=True)[1])]
+        drawn = drawn[self._places(drawn) < 0]
+        first, rest = drawn[: _EACH // 2], drawn[_EACH // 2 :]
+        return np.concatenate([first, self._rng.permutation(rest)[: _EACH - len(first)]])
+
+    def _screened(self, drawn: Array) -> Array:
+        """Designs that meet the conditions in closed form; if none does, that are accepted."""
         violation = self._violations(drawn, self._closed)
         met = violation.sum(axis=1) == 0
-        chosen = met if met.any() else violation[:, -1] == 0
-        fixed = drawn[chosen][: _EACH // 2]
-        others = drawn[chosen][_EACH // 2 :]
-        return np.concatenate([fixed, self._rng.permutation(others)[: _EACH - len(fixed)]])
+        return drawn[met if met.any() else violation[:, -1] == 0]  # `accepted` is the last.
+
+    def _walking(self, drawn: Array) -> Array:
+        """Designs that the policy drives, in its region if the given one is."""
+        many = self._design.spec.resolve(self._design.values, self._values(drawn))
+        members, _ = walkers(self._source, many, None)
+        if not members:
+            return drawn[:0]
+        own = np.array(family_features(tuple(members.values())))
+        rows = np.array([*members])
+        seen = zip(self._seen, (drawn[rows], own), strict=True)
+        drawn_before, own_before = (np.concatenate(pair) for pair in seen)
+        self._seen = drawn_before, own_before
+        region, match = self._source.region, self._source.match
+        inside = [
+            bool(self._outside) or region.includes(one, features, match(one).joints)
+            for one, features in zip(members.values(), own, strict=True)
+        ]
+        return drawn[rows[inside]]
 
     def _roll(self, drawn: Array) -> _Rolled:
-        """Roll out designs, and add them to those of before."""
+        """Roll out designs, and add them to those of before; the given one is the first of all."""
+        if not len(drawn):
+            return self._known
         many = self._design.spec.resolve(self._design.values, self._values(drawn))
         found = paired(self._source, many, self._names, self._rollouts, self._report)
         self._done += found.rollouts
-        closed: Mapping[str, Value] = of_design(many, self._metrics)
-        gaps = np.array([self._gaps(one, many, closed, found.values) for one in self._learned])
-        again = np.array(
-            [
-                [
-                    self._gaps(
-                        one, many, closed, {name: x[k] for name, x in found.resampled.items()}
-                    )
-                    for one in self._learned
-                ]
-                for k in range(RESAMPLES)
-            ]
-        )  # (resamples, conditions, N)
-        margin = quantile(self._rollouts.replicas, _ONE_SIDED) * again.std(axis=0)
-        rows = np.array([*found.members], dtype=np.intp)
-        own = family_features(tuple(found.members.values())) if len(rows) else []
-        more = _Rolled(
-            drawn[rows],
-            gaps.T[rows],
-            margin.T[rows],
-            self._violations(drawn, self._closed).sum(axis=1)[rows],
-            found.values[_INSIDE][rows] > 0,
-            np.array(own).reshape(len(rows), -1),
-            np.array([found.values[name] for name in self._names]).T[rows],
-        )
-        if self._rolled is not None and len(rows):
-            pairs = zip(self._rolled, more, strict=True)
-            more = _Rolled(*(np.concatenate(pair) for pair in pairs))
-        if len(rows):
-            self._rolled = more
-        if self._rolled is None:
-            raise DraftError("no design of the ranges can be rolled out", "give other ranges")
-        return self._rolled
+        if not self._base:
+            more = {"replicas": _BASE * self._rollouts.replicas, "seed": self._rollouts.seed}
+            base = paired(self._source, many, self._names, BodyRollOuts.of(more), rows=_ONLY_FIRST)
+            self._done += base.rollouts
+            for name in self._names:
+                self._base[name] = base.values[name][0], base.resampled[name][:, 0]
+                self._own[name] = found.values[name][0], found.resampled[name][:, 0]
+        values = {n: x + self._base[n][0] - self._own[n][0] for n, x in found.values.items()}
+        again = {
+            n: x + (self._base[n][1] - self._own[n][1])[:, None] for n, x in found.resampled.items()
+        }
+        closed = of_design(many, self._metrics)
 
-    def _gaps(
-        self, one: Constraint, many: Design, closed: Mapping[str, Value], learned: dict[str, Array]
-    ) -> Array:
+        def gaps(learned: dict[str, Array]) -> Array:
+            each = [self._gap(one, many, {**closed, **learned}) for one in self._learned]
+            return np.stack(each, axis=1)
+
+        spread = np.std([gaps({n: x[k] for n, x in again.items()}) for k in range(RESAMPLES)], 0)
+        more_rows = _Rolled(
+            drawn,
+            gaps(values),
+            spread,
+            self._violations(drawn, self._closed).sum(axis=1),
+            np.stack([values[name] for name in self._names], axis=1),
+        )
+        if self._rolled is not None:
+            pairs = zip(self._rolled, more_rows, strict=True)
+            more_rows = _Rolled(*(np.concatenate(pair) for pair in pairs))
+        self._rolled = more_rows
+        return more_rows
+
+    def _gap(self, one: Constraint, many: Design, metrics: Mapping[str, Value]) -> Array:
         """Smaller less larger side of a condition, over the larger; 1 where it is undefined."""
-        metrics = {**closed, **learned}
         with np.errstate(all="ignore"):
             if one.gap is None:
                 gap = np.where(one.holds.holds(many, metrics), -1.0, 1.0)
@@ -237,11 +252,17 @@ class RolledOutSearch(Search):
             raise RuntimeError("nothing was rolled out")
         return self._rolled
 
+    @property
+    def _sure(self) -> Array:
+        """Gaps that the designs rolled out so far exceed in 5 % of cases, shape as `gap`."""
+        known = self._known
+        # The deviation of one body by few roll-outs may be too small by chance.
+        return known.gap + _SURE * np.maximum(known.deviation, np.median(known.deviation, axis=0))
+
     def _best(self) -> Array | None:
         """The nearest design that meets all conditions, of those that were rolled out."""
         known = self._known
-        sure = ((known.gap + known.margin) <= 0).all(axis=1) & (known.closed == 0)
-        sure &= known.inside | bool(self._outside)
+        sure = (self._sure <= 0).all(axis=1) & (known.closed == 0)
         if not sure.any():
             return None
         met = known.drawn[sure]
@@ -250,22 +271,14 @@ class RolledOutSearch(Search):
     def _least(self) -> Array:
         """The design that misses least, of those that were rolled out."""
         known = self._known
-        miss = np.maximum(known.gap + known.margin, 0).sum(axis=1) + known.closed
-        miss += 0.0 if self._outside else np.where(known.inside, 0.0, _WORST)
+        miss = np.maximum(self._sure, 0).sum(axis=1) + known.closed
         return known.drawn[miss.argmin()]
 
     def _predict_around(self, centre: Array) -> None:
-        """Fit gaps and features as linear functions of the numbers, by designs near one."""
+        """Fit gaps, and features of the policy's region, as linear functions of the numbers."""
         known = self._known
-        away = ((known.drawn - centre) ** 2).sum(axis=1)
-        reach = max(_NEAR, 2 * float(np.linalg.norm(centre)))
-        weight = np.exp(-away / reach**2 / 2)[:, None]
-        inputs = np.column_stack([np.ones(len(known.drawn)), known.drawn])
-        outputs = np.column_stack([known.gap, known.features])
-        prior = _NOISE * np.eye(inputs.shape[1])[1:]
-        left = np.concatenate([weight * inputs, prior])
-        right = np.concatenate([weight * outputs, np.zeros((len(prior), outputs.shape[1]))])
-        self._fit = np.linalg.lstsq(left, right, rcond=None)[0]
+        pairs = ((known.drawn, known.gap), self._seen)
+        self._fits = tuple(_fitted(drawn, values, centre) for drawn, values in pairs)
 
     def _violation(
         self, one: Constraint, drawn: Array, many: Design, found: Mapping[str, Value]
@@ -273,17 +286,15 @@ class RolledOutSearch(Search):
         if one not in self._learned:
             return super()._violation(one, drawn, many, found)
         known, place = self._known, self._learned.index(one)
-        columns = len(self._learned)
-        predicted = np.column_stack([np.ones(len(drawn)), drawn]) @ self._fit
-        gap = predicted[:, place] + np.median(known.margin[:, place])
+        inputs = np.column_stack([np.ones(len(drawn)), drawn])
+        gap = inputs @ self._fits[0][:, place] + _SURE * np.median(known.deviation[:, place])
         if not self._outside:
             low, high = np.array(self._source.region.low), np.array(self._source.region.high)
-            size = np.maximum(high - low, 1e-9)
-            beyond = np.maximum(predicted[:, columns:] - high, low - predicted[:, columns:]) / size
+            features = inputs @ self._fits[1]
+            beyond = np.maximum(features - high, low - features) / np.maximum(high - low, 1e-9)
             gap = np.maximum(gap, beyond.max(axis=1, initial=-1.0))
         at = self._places(drawn)
-        sure = (known.gap + known.margin)[at, place]
-        return np.maximum(np.where(at >= 0, sure, gap), 0.0)
+        return np.maximum(np.where(at >= 0, self._sure[at, place], gap), 0.0)
 
     def _places(self, drawn: Array) -> NDArray[np.intp]:
         """Place of each design among those that were rolled out; -1 for others."""
@@ -294,8 +305,6 @@ class RolledOutSearch(Search):
         at = self._places(drawn[None])[0]
         if one not in self._learned or at < 0:
             return one.text if one in self._learned else super()._reached(one, design, drawn)
-        if not (self._outside or self._known.inside[at]):
-            return f"{one.text}, and it is outside the region of the policy"
         sure = "" if self._known.gap[at, self._learned.index(one)] > 0 else " (by chance, perhaps)"
         return super()._reached(one, design, drawn) + sure
 
@@ -303,3 +312,22 @@ class RolledOutSearch(Search):
         closed = of_design(design, [name for name in names if name not in self._names])
         values = self._known.values[self._places(drawn[None])[0]].tolist()
         return {**closed, **dict(zip(self._names, values, strict=True))}
+
+
+def _evenly(drawn: Array, centre: Array, count: int) -> Array:
+    """Some designs, evenly spread over their distances from one, the nearest first."""
+    order = np.argsort(((drawn - centre) ** 2).sum(axis=1), kind="stable")
+    return drawn[order[np.unique(np.linspace(0, max(len(order) - 1, 0), count).astype(int))]]
+
+
+def _fitted(drawn: Array, values: Array, centre: Array) -> Array:
+    """Linear functions of designs, with more weight on those near one, shape (1 + numbers, of)."""
+    away = ((drawn - centre) ** 2).sum(axis=1)
+    reach = max(_NEAR, float(np.linalg.norm(centre)))
+    weight = np.exp(-away / reach**2 / 2)[:, None]
+    inputs = np.column_stack([np.ones(len(drawn)), drawn])
+    prior = _NOISE * np.eye(inputs.shape[1])[1:]
+    left = np.concatenate([weight * inputs, prior])
+    right = np.concatenate([weight * values, np.zeros((len(prior), values.shape[1]))])
+    found: Array = np.linalg.lstsq(left, right, rcond=None)[0].astype(np.float64)
+    return found
