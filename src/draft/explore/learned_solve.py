@@ -1,7 +1,7 @@
 """The nearest design that meets conditions on learned metrics: a screen first, roll-outs last.
 
 Conditions in closed form and the policy's region are screened first. A batch of designs around the
-nearest that meets them is rolled out, and linear predictions of the learned conditions are fitted
+nearest that meets them is rolled out, and predictions of the learned conditions are fitted
 to the results. Each round searches by the predictions, rolls out designs around what it finds and
 between there and the given design, and fits again with more weight on near ones. Only designs that
 were rolled out are solutions.
@@ -34,13 +34,13 @@ from draft.values import Array, Value
 from draft.variation.axes import Axis
 
 _INSIDE = "learned.inside"
-_FIRST, _EACH, _ROUNDS = 22, 14, 3  # Bodies of the first batch and of each round; rounds.
+_PAIRS, _STEP = 12, 0.06  # Of the first batch: pairs of designs, and their change.
+_EACH, _ROUNDS = 14, 3  # Bodies of a round; rounds.
 _LAST = 3  # Batches of a solution with one number as it was.
-_SCREENED, _WALKING = 1024, 128  # Designs screened for the first batch; those of them for a region.
 _BASE = 16  # Roll-outs of the given design, over those of others.
 _SURE = 1.645  # Standard deviations that a normal number exceeds in 5 % of cases.
 _NOISE = 1e-2  # Standard deviation of a gap by roll-outs, over that of its slopes.
-_NEAR = 0.1  # Least distance over which predictions are fitted.
+_NEAR = 0.25  # Least distance over which predictions are fitted.
 _WIDTH, _SHRINK = 0.3, 0.6  # Of a round's designs around its target, over its change.
 _PULLS = (1.0, 1.08, 0.92, 1.2, 0.84, 0.7)
 _WORST = 1.0  # Gap of a robot that falls.
@@ -151,11 +151,15 @@ class RolledOutSearch(Search):
         )
 
     def _spread(self, centre: Array) -> Array:
-        """Designs around one in rising distance that meet the conditions in closed form."""
-        size = self._rng.uniform(0.03, 0.4, (_SCREENED, 1))
-        drawn = self._inside(centre + size * self._rng.uniform(-1, 1, (_SCREENED, len(centre))))
-        drawn = self._walking(_evenly(self._screened(drawn), centre, _WALKING))
-        return _evenly(drawn, centre, _FIRST)
+        """Pairs of designs on both sides of one, that tell the slopes best: orthogonal columns."""
+        count = max(_PAIRS, len(centre) + 1)
+        turned = np.linalg.qr(self._rng.normal(size=(count, count)))[0][:, : len(centre)]
+        step = _STEP * np.sqrt(count) * turned[:_PAIRS]
+        drawn = self._inside(centre + np.concatenate([step, -step]))
+        accepted = self._violations(drawn, self._closed)[:, -1] == 0
+        drawn = np.where(accepted[:, None], drawn, centre + (drawn - centre) / 2)
+        self._walking(drawn)  # Their features tell where the region ends.
+        return drawn
 
     def _around(self, target: Array, centre: Array, width: float) -> Array:
         """Designs of a round: around a target, and between a known design and the given one."""
@@ -275,7 +279,7 @@ class RolledOutSearch(Search):
         return known.drawn[miss.argmin()]
 
     def _predict_around(self, centre: Array) -> None:
-        """Fit gaps, and features of the policy's region, as linear functions of the numbers."""
+        """Fit gaps, and features of the policy's region, as functions of the numbers."""
         known = self._known
         pairs = ((known.drawn, known.gap), self._seen)
         self._fits = tuple(_fitted(drawn, values, centre) for drawn, values in pairs)
@@ -286,7 +290,7 @@ class RolledOutSearch(Search):
         if one not in self._learned:
             return super()._violation(one, drawn, many, found)
         known, place = self._known, self._learned.index(one)
-        inputs = np.column_stack([np.ones(len(drawn)), drawn])
+        inputs = _inputs(drawn)
         gap = inputs @ self._fits[0][:, place] + _SURE * np.median(known.deviation[:, place])
         if not self._outside:
             low, high = np.array(self._source.region.low), np.array(self._source.region.high)
@@ -305,8 +309,15 @@ class RolledOutSearch(Search):
         at = self._places(drawn[None])[0]
         if one not in self._learned or at < 0:
             return one.text if one in self._learned else super()._reached(one, design, drawn)
-        sure = "" if self._known.gap[at, self._learned.index(one)] > 0 else " (by chance, perhaps)"
-        return super()._reached(one, design, drawn) + sure
+        text = super()._reached(one, design, drawn)
+        if one.gap is None:
+            return text
+        sides = [
+            abs(float(np.asarray(x.value(design, self._measured(design, drawn, x.metrics)))))
+            for x in one.gap
+        ]
+        chance = _SURE * self._known.deviation[at, self._learned.index(one)] * max(sides)
+        return f"{text} ± {chance:.2g}"
 
     def _measured(self, design: Design, drawn: Array, names: Sequence[str]) -> Mapping[str, Value]:
         closed = of_design(design, [name for name in names if name not in self._names])
@@ -314,18 +325,16 @@ class RolledOutSearch(Search):
         return {**closed, **dict(zip(self._names, values, strict=True))}
 
 
-def _evenly(drawn: Array, centre: Array, count: int) -> Array:
-    """Some designs, evenly spread over their distances from one, the nearest first."""
-    order = np.argsort(((drawn - centre) ** 2).sum(axis=1), kind="stable")
-    return drawn[order[np.unique(np.linspace(0, max(len(order) - 1, 0), count).astype(int))]]
+def _inputs(drawn: Array) -> Array:
+    """Inputs of predictions: one, the numbers, and the square of the change."""
+    return np.column_stack([np.ones(len(drawn)), drawn, (drawn**2).sum(axis=1)])
 
 
 def _fitted(drawn: Array, values: Array, centre: Array) -> Array:
-    """Linear functions of designs, with more weight on those near one, shape (1 + numbers, of)."""
+    """Coefficients of the inputs, with more weight on designs near one, shape (inputs, values)."""
     away = ((drawn - centre) ** 2).sum(axis=1)
-    reach = max(_NEAR, float(np.linalg.norm(centre)))
-    weight = np.exp(-away / reach**2 / 2)[:, None]
-    inputs = np.column_stack([np.ones(len(drawn)), drawn])
+    weight = np.exp(-away / max(_NEAR, float(np.linalg.norm(centre))) ** 2 / 2)[:, None]
+    inputs = _inputs(drawn)
     prior = _NOISE * np.eye(inputs.shape[1])[1:]
     left = np.concatenate([weight * inputs, prior])
     right = np.concatenate([weight * values, np.zeros((len(prior), values.shape[1]))])
