@@ -109,6 +109,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "payload": _robots("courier"),
     "motors": _motors,
     "import": _robots("go2", "go2:long"),
+    "levers": _copy("levers.png"),
     "explore": _copy("search/front.png"),
     "train": _walk,
     "walk": _studio,

@@ -64,6 +64,7 @@ BELOW: dict[str, set[str]] = {
         *("metrics", "learn"),
     },
     "study": {"laws", "spec", "design", "model", "metrics", "explore", "learn"},
+    "assistant": {"laws", "spec", "design", "model", "metrics", "variation", "explore", "learn"},
     "doctor": {"learn"},
     "cli": {
         *("laws", "spec", "design", "model", "description", "fitting", "imports", "twins"),
@@ -79,6 +80,7 @@ BELOW: dict[str, set[str]] = {
             "validation",
         ),
         "doctor",
+        "assistant",
     },
     # The face for extensions: names by their modules, like those of the package itself.
     "extend": {"errors"},

@@ -34,6 +34,7 @@ NEEDS = {
         "`sweep`": f"sweep {VARY} --n 10 --out s",
         "`optimise`": SEARCH,
     },
+    "mcp": {"`mcp`": "mcp ."},
     "cluster": {"`study --ray`": "study examples/three_quadrupeds.yaml --toy --ray"},
     "robots": {"`import` of robots by name": "import menagerie:unitree_go2 --out i"},
     "learn": {

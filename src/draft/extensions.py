@@ -189,6 +189,18 @@ def culprit(error: BaseException) -> Extension | None:
     return found
 
 
+def fault(error: BaseException) -> str:
+    """Message about an unexpected error: a fault of an extension, or of Draft itself."""
+    if (one := culprit(error)) is not None:
+        head = f"the extension '{one.name}' of {one.package} {one.version} fails"
+        return f"{head}: {reason(error)[:400]}\n  DRAFT_TRACEBACK=1 shows where"
+    return (
+        f"this is a fault of Draft: {type(error).__name__}: {str(error)[:400]}\n"
+        "  please report it to Draft's developers, with the command and the robot's files; "
+        "DRAFT_TRACEBACK=1 shows where it happened"
+    )
+
+
 def reason(error: BaseException) -> str:
     """What an error of an extension says, in one line, with its kind."""
     words = " ".join(str(error).split())

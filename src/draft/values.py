@@ -47,6 +47,17 @@ def brief(value: Value) -> str:
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e7 else f"{value:.3g}"
 
 
+def told_apart(before: float, after: float) -> tuple[str, str]:
+    """Texts of two values, with as many digits as it takes to see which is larger."""
+    for digits in range(3, 17):
+        first, second = (
+            f"{x:.0f}" if 10**digits <= abs(x) < 1e7 else f"{x:.{digits}g}" for x in (before, after)
+        )
+        if first != second or before == after:
+            return first, second
+    return repr(before), repr(after)
+
+
 def _unary(
     on_float: Callable[[float], float], on_array: Callable[[Array], Array]
 ) -> Callable[[Value], Value]:

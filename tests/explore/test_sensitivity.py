@@ -16,6 +16,7 @@ import draft
 from draft.errors import DraftError
 from draft.explore.sensitivity import Sensitivity, sensitivity, stated_numbers, step_of
 from draft.metrics import of_design
+from draft.metrics.measure import of_model
 from draft.model.model import preview
 from draft.values import scalar
 from tests.commands import Command
@@ -55,6 +56,19 @@ def test_the_effect_on_the_mass_is_that_of_mujocos_models(name: str) -> None:
         for x in (value, value + step)
     ]
     assert effect(FOUND, "step_up", name, "mass") == pytest.approx(masses[1] - masses[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("metric", ["impact_mitigation", "foot_inertia", "reflected_share"])
+def test_the_effect_on_a_metric_of_models_is_that_of_models_built_one_by_one(metric: str) -> None:
+    found = sensitivity(BEAR, [metric, "mass"], ["thigh_length", TORQUE], samples=8)
+    moved = QUADRUPED.resolve("bear", {"thigh_length": found.values[0] + found.steps[0]})
+    before, after = (of_model(one.build(), [metric])[metric] for one in (BEAR, moved))
+    assert found.base[0] == pytest.approx(before, rel=1e-9)
+    assert found.step_up[0, 0] == pytest.approx(after - before, rel=1e-6)
+    assert found.low[0, 0] < found.step_up[0, 0] < found.high[0, 0]
+    # The filter refuses more torque, so that there is no model.
+    assert math.isnan(found.step_up[1, 0])
+    assert not math.isnan(found.step_up[1, 1])
 
 
 def test_the_band_of_an_effect_is_narrower_than_that_of_the_metric() -> None:
@@ -102,7 +116,7 @@ def test_a_step_is_about_a_tenth_and_has_one_digit(value: float) -> None:
     ("of", "by", "message"),
     [
         (["mas"], [], "there is no metric 'mas'"),
-        (["impact_mitigation"], [], "'impact_mitigation' needs a compiled model"),
+        (["learned.top_speed"], [], "'learned.top_speed' needs a policy"),
         (["mass"], ["thigh"], "'thigh' is not a parameter"),
         (["mass"], ["abduction_length"], "'abduction_length' follows from 'leg.length + 1.1 *"),
         (["mass"], ["actuators.leg.mass"], "does not state 'actuators.leg.mass'"),

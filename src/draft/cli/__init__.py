@@ -49,6 +49,7 @@ COMMANDS = {
     "trends": "Fit, show, check and draw the actuator trends.",
     "survey": "Read public robot descriptions and fit the structure trends.",
     "schema": "Print or write the JSON Schemas of the files.",
+    "mcp": "Let an assistant design robots below a folder, over the Model Context Protocol.",
     "doctor": "Describe the installation and the machine in a table for an issue.",
 }
 
@@ -269,18 +270,10 @@ def _fault(error: Exception) -> int:
         import traceback
 
         traceback.print_exception(error)
-    from draft.extensions import culprit, reason
+    from draft.extensions import culprit, fault
 
-    if (one := culprit(error)) is not None:
-        head = f"the extension '{one.name}' of {one.package} {one.version} fails"
-        return _fail(f"{head}: {reason(error)[:400]}\n  DRAFT_TRACEBACK=1 shows where")
-    print(
-        f"error: this is a fault of Draft: {type(error).__name__}: {str(error)[:400]}\n"
-        "  please report it to Draft's developers, with the command and the robot's files; "
-        "DRAFT_TRACEBACK=1 shows where it happened",
-        file=sys.stderr,
-    )
-    return FAULT
+    _fail(fault(error))
+    return FAULT if culprit(error) is None else BAD_INPUT
 
 
 def _indented(text: str) -> str:

@@ -28,8 +28,9 @@ from draft.design import Design
 from draft.errors import DraftError
 from draft.learn.measuring.bands import mass_bands
 from draft.learn.measuring.evaluation_options import SeeingPolicy
-from draft.metrics import LEARNED, METRICS, find, of_design, of_model
+from draft.metrics import LEARNED, METRICS, find
 from draft.metrics.learned import PREFIX
+from draft.metrics.record import descriptions, measure, record
 from draft.metrics.statics import joint_margins
 from draft.values import scalar
 
@@ -68,7 +69,7 @@ def main(
             remedy = "name one: draft metrics quadruped --design bear"
             cause = "--design, --set, --payload and --learned need a robot"
             raise DraftError(cause, remedy)
-        print(jsons.dumps(_descriptions(), indent=2)) if json else console().print(_list())
+        print(jsons.dumps(descriptions(), indent=2)) if json else console().print(_list())
         return 0
     resolved, _ = open_design(reference, design, values, payload)
     found = measure(resolved)
@@ -81,26 +82,10 @@ def main(
         found |= {name: scalar(x) for name, x in measured.items()}
     margins = {name: scalar(x) for name, x in joint_margins(resolved).items()}
     if json:
-        print(jsons.dumps(_record(resolved, found, margins), indent=2, allow_nan=False))
+        print(jsons.dumps(record(resolved, found), indent=2, allow_nan=False))
     else:
         _print(resolved, found, margins, _outside(resolved, policy) if learned else "")
     return 0 if resolved.accepted else 1
-
-
-def measure(design: Design) -> dict[str, float]:
-    """Return all metrics of a design; NaN for those that need a model if it is refused."""
-    if design.accepted:
-        return of_model(design.build())
-    closed = of_design(design)
-    return {name: scalar(closed.get(name, math.nan)) for name in METRICS}
-
-
-def _descriptions() -> list[dict[str, str]]:
-    keys = ("name", "unit", "doc", "formula", "source", "better", "needs")
-    return [
-        {key: getattr(metric, key) for key in keys}
-        for metric in (*METRICS.values(), *LEARNED.values())
-    ]
 
 
 def _list() -> Table:
@@ -174,20 +159,3 @@ def _shown(value: float) -> str:
     if math.isnan(value):
         return "-"
     return "no load" if math.isinf(value) else f"{value:.4g}"
-
-
-def _record(
-    design: Design, found: dict[str, float], margins: dict[str, float]
-) -> dict[str, object]:
-    """Return one JSON object; null for metrics that the robot lacks, or joints without load."""
-    numbers = {name: _finite(value) for name, value in found.items()}
-    return {
-        "name": design.name,
-        "design": design.label,
-        "metrics": numbers | {"accepted": bool(design.accepted)},
-        "torque_margins": {name: _finite(value) for name, value in margins.items()},
-    }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

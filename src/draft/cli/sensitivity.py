@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 # Metrics that are printed unless some are named; the JSON has all.
 USUAL = ("mass", "payload_rated", "jump_height", "top_speed", "standing_power")
+_CHANCE = "~0"  # A change that chance may explain.
 _NUMBER, _CELL = 44, 28  # Width of the first columns of a table, and of a metric.
 
 
@@ -40,7 +41,7 @@ def main(
         tuple[str, ...],
         tyro.conf.arg(
             metavar="METRIC ...",
-            help="Metrics that need no model, and learned ones ('draft metrics' lists them).",
+            help="Metrics; learned ones need roll-outs ('draft metrics' lists them).",
             help_behavior_hint=f"(default: {', '.join(USUAL)})",
         ),
     ] = (),
@@ -226,6 +227,10 @@ def _cell(found: Sensitivity, i: int, k: int) -> str:
         return "-"
     if change == other == 0 or not found.sizes[i, k]:
         return ""
+    if found.learned[k]:
+        more = _side(change, found.low[i, k], found.high[i, k])
+        less = _side(other, -found.down_high[i, k], -found.down_low[i, k])
+        return more if more != _CHANCE and not found.kinked[i, k] else f"{more} | {less}"
     text = signed(change)
     if found.kinked[i, k]:
         text += f" | {signed(other)}"
@@ -233,7 +238,14 @@ def _cell(found: Sensitivity, i: int, k: int) -> str:
     if not math.isnan(low) and signed(low) != signed(high):
         text += f" ({signed(low)}..{signed(high)})"
     percent = found.up[i, k]
-    return text if math.isnan(percent) else f"{text}\n{100 * percent:+.2g} %"
+    return f"{text}\n{100 * percent:+.2g} %" if percent and not math.isnan(percent) else text
+
+
+def _side(change: float, low: float, high: float) -> str:
+    """A change by roll-outs with its interval, if that excludes zero."""
+    if math.isnan(change):
+        return "-"
+    return f"{signed(change)} ({signed(low)}..{signed(high)})" if low > 0 or high < 0 else _CHANCE
 
 
 def signed(change: float) -> str:

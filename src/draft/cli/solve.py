@@ -5,10 +5,9 @@ from __future__ import annotations
 import json as jsons
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
-import yaml
 from rich.table import Table
 from rich.text import Text
 
@@ -20,7 +19,7 @@ from draft.cli.settings_options import with_options
 from draft.errors import DraftError
 from draft.explore.settings import TargetSettings
 from draft.metrics.learned import PREFIX
-from draft.values import brief
+from draft.values import told_apart
 
 if TYPE_CHECKING:
     from draft.design import Design
@@ -99,25 +98,13 @@ def main(
     if found.conflict is None and found.moved:
         name = resolved.reference.replace(":", "-")
         path = out or Path(f"out/{name}-solved.yaml")
-        files.write(path, _design_file(resolved, found, conditions))
+        files.write(path, found.design_file(resolved, conditions))
     if json:
-        print(jsons.dumps(_record(found, path), indent=2, allow_nan=False))
+        record = found.record() | {"file": None if path is None else str(path)}
+        print(jsons.dumps(record, indent=2, allow_nan=False))
     else:
         _print(resolved, found, path)
     return 0 if found.conflict is None else NOT_MET
-
-
-def _design_file(start: Design, found: Solution, conditions: tuple[str, ...]) -> str:
-    """Text of the design file: the values, and above them why each number moved."""
-    doc = f"Nearest to {start.reference} with {', '.join(conditions)}."
-    lines = []
-    for one in found.moved:
-        why = f"; else {'; '.join(one.why)}" if one.why else ""
-        lines.append(f"# {one.name}: {brief(one.before)} -> {brief(one.after)}{why}")
-    values = dict(start.values) | {one.name: one.after for one in found.moved}
-    document = {"doc": doc, "values": values}
-    text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=1000)
-    return "\n".join([*lines, text])
 
 
 def _print(start: Design, found: Solution, path: Path | None) -> None:
@@ -142,7 +129,7 @@ def _print(start: Design, found: Solution, path: Path | None) -> None:
     table.add_column("to", justify="right", no_wrap=True)
     table.add_column("" if found.conflict else "without this change", style="dim")
     for one in found.moved:
-        row = one.name, brief(one.before), brief(one.after), "\n".join(one.why)
+        row = one.name, *told_apart(one.before, one.after), "\n".join(one.why)
         table.add_row(*(Text(cell) for cell in row))
     out.print("", table, "")
     rolled = f", {found.rollouts:,} roll-outs" if found.rollouts else ""
@@ -152,20 +139,3 @@ def _print(start: Design, found: Solution, path: Path | None) -> None:
         out.print(note, style="yellow", markup=False)
     if path is not None:
         out.print(str(path), markup=False)
-
-
-def _record(found: Solution, path: Path | None) -> dict[str, Any]:
-    conflict = found.conflict
-    return {
-        "met": conflict is None,
-        "change": found.change,
-        "moved": [
-            {"name": one.name, "from": one.before, "to": one.after, "why": list(one.why)}
-            for one in found.moved
-        ],
-        "excluded_together": [] if conflict is None else list(conflict.conditions),
-        "misses": [] if conflict is None else list(conflict.misses),
-        "designs_computed": found.tried,
-        **({"rollouts": found.rollouts, "notes": list(found.notes)} if found.rollouts else {}),
-        "file": None if path is None else str(path),
-    }

@@ -13,13 +13,15 @@ from draft.design.design import Body, Design, SegmentMass
 from draft.design.electronics import electronics
 from draft.design.plan import plan
 from draft.design.structure_law import leg_of_trunk, structure_laws, trunk_words
+from draft.errors import DraftError
 from draft.laws import catalogue
 from draft.laws.catalogue import Part
 from draft.laws.law import Law
 from draft.laws.quantities import CORNER, QUANTITIES, Quantity
 from draft.laws.structure import Centre, Population
+from draft.spec.load import load
 from draft.spec.schema import STATED, TREND
-from draft.values import Value, scalar
+from draft.values import Value, plain, scalar
 
 # Relative difference of masses that are equal but for rounding.
 SAME = 1e-9
@@ -50,14 +52,7 @@ def report(design: Design) -> dict[str, Any]:
         "n_joints": len(design.joints),
         "accepted": design.accepted,
         "findings": [finding.record() for finding in design.findings],
-        "parameters": {
-            name: {
-                "value": value,
-                "unit": design.spec.parameters[name].unit,
-                "doc": design.spec.parameters[name].doc,
-            }
-            for name, value in design.parameters.items()
-        },
+        "parameters": _parameters(design),
         "actuators": {
             name: actuator_record(actuator, plan(design.spec).own) | {"used": name in used}
             for name, actuator in design.actuators.items()
@@ -69,6 +64,55 @@ def report(design: Design) -> dict[str, Any]:
         "segments": [_segment(segment, population) for segment in design.segments],
         "carried": [_carried(name, of) for name, of in carried_parts(design).items()],
         "bodies": design.body_masses(),
+    }
+
+
+def summary(design: Design) -> dict[str, Any]:
+    """Short report of a single design, as plain data: verdict, masses, numbers and findings."""
+    bounds = {name: one.bounds for name, one in design.spec.parameters.items()}
+    actuators = {
+        name: {"like": actuator.like} | {key: getattr(actuator, key) for key in actuator.quantities}
+        for name, actuator in design.actuators.items()
+    }
+    return plain(
+        {
+            "name": design.name,
+            "design": design.label,
+            "mass_kg": design.mass,
+            "n_joints": len(design.joints),
+            "accepted": design.accepted,
+            "findings": [finding.record() for finding in design.findings],
+            "parameters": {
+                name: one | {"range": bounds[name]} for name, one in _parameters(design).items()
+            },
+            "actuators": actuators,
+            "bodies": design.body_masses(),
+        }
+    )
+
+
+def designs_of(robots: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Mass, joints and description of all designs of robots, by reference; or what is wrong."""
+    found: dict[str, dict[str, Any]] = {}
+    for robot in robots:
+        try:
+            spec = load(robot)
+            named = {robot: (None, spec.doc)}
+            named |= {f"{robot}:{one.name}": (one.name, one.doc) for one in spec.designs.values()}
+            for reference, (name, doc) in named.items():
+                one = spec.resolve(name)
+                mass, joints = scalar(one.mass), len(one.joints)
+                found[reference] = {"mass_kg": mass, "n_joints": joints, "doc": doc}
+        except DraftError as error:
+            found[robot] = {"problem": str(error)}  # The others are listed all the same.
+    return found
+
+
+def _parameters(design: Design) -> dict[str, dict[str, Any]]:
+    known = design.spec.parameters
+    return {
+        name: {"value": value, "unit": known[name].unit, "doc": known[name].doc}
+        for name, value in design.parameters.items()
     }
 
 

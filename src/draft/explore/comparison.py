@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from draft.design import Design
 from draft.design.error_samples import sample_errors
 from draft.errors import DraftError
-from draft.explore.sensitivity import stated_numbers
+from draft.explore.sensitivity import STILL, stated_numbers
 from draft.metrics import METRICS, find, of_design
 from draft.spec.payload import MASS
 from draft.values import Array, Value, scalar
@@ -174,6 +174,7 @@ def _part(a: Design, b: Design, metrics: tuple[str, ...], seed: int, samples: in
     exact = len(names) <= EXACT
     with np.errstate(invalid="ignore"):  # A time without a limit has no difference.
         shares = _shapley(len(names), measured, seed, exact)
+        shares[abs(shares) <= STILL * abs(shares).max(axis=0, initial=0.0)] = 0.0
         better = _better(a, b, metrics, seed, samples)
     texts = [tuple(_text(of[name]) for name in names) for of in (before, after)]
     return Part(names, texts[0], texts[1], shares, better, exact)

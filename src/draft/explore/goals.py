@@ -66,7 +66,8 @@ class Constraint:
                 np.asarray(side.value(design, metrics), dtype=np.float64) for side in self.gap
             )
             size = np.maximum(np.maximum(abs(small), abs(large)), 1e-9)
-            violation = np.broadcast_to((small - large) / size, violation.shape)
+            with np.errstate(invalid="ignore"):  # Both may be without a limit.
+                violation = np.broadcast_to((small - large) / size, violation.shape)
             # A strict comparison also fails for equal sides.
             finite = np.isfinite(violation)
             violation = np.where(finite, np.maximum(violation, 1e-9), _WORST)

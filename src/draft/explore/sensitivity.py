@@ -21,7 +21,7 @@ from draft.design.error_samples import sample_errors
 from draft.errors import DraftError, suggest
 from draft.explore.settings import EffectSettings, Progress
 from draft.metrics import LEARNED, METRICS, find, of_design
-from draft.metrics.measure import needs_more
+from draft.metrics.measure import needs_more, of_batch
 from draft.spec.check import key_problem
 from draft.spec.payload import with_payload
 from draft.values import Array, Value, scalar
@@ -32,7 +32,8 @@ SAMPLES = 64
 _ENDS = (0.05, 0.95)
 _SHARE = 0.1  # A designer's step, about this share of a number.
 _DIGITS = (1.0, 2.0, 5.0, 10.0)
-_STILL = 1e-9  # Relative change that is rounding.
+STILL = 1e-9  # Relative change that is rounding.
+_COLUMNS = ("up", "down", "step_up", "step_down", "low", "high")
 _DOWN = ("down_low", "down_high")
 _KINK = 0.1  # Difference of both sides, over the larger, from which both are shown.
 
@@ -133,9 +134,8 @@ class Sensitivity:
                     "step": float(self.steps[i]),
                     **{
                         key: row(getattr(self, key)[i])
-                        for key in ("up", "down", "step_up", "step_down", "low", "high")
+                        for key in _COLUMNS + (_DOWN if by_rollouts else ())
                     },
-                    **({key: row(getattr(self, key)[i]) for key in _DOWN} if by_rollouts else {}),
                     "accepted": dict(
                         zip(("step_down", "now", "step_up"), self.accepted[i].tolist(), strict=True)
                     ),
@@ -157,7 +157,7 @@ def sensitivity(
     policy: str | Path | None = None,
     progress: Progress | None = None,
 ) -> Sensitivity:
-    """Effects of a design's numbers on its metrics, closed-form or learned.
+    """Effects of a design's numbers on its metrics.
 
         >>> found = draft.sensitivity(draft.load("quadruped").resolve("bear"), of=["mass"])
         >>> i = found.names.index("actuators.leg.peak_torque")
@@ -166,7 +166,7 @@ def sensitivity(
 
     Args:
         design: one design.
-        of: metrics that need no model, and learned ones; empty for all that need neither.
+        of: metrics; empty for all that need no model and no policy.
         by: parameters (`thigh_length`) and quantities of actuators (`actuators.leg.peak_torque`);
             empty for all that the design states as numbers.
         samples: samples of the errors of the laws.
@@ -177,15 +177,14 @@ def sensitivity(
         progress: called with the bodies rolled out and their number.
 
     Raises:
-        DraftError: the design is several, a name is unknown or given by an expression, a metric
-            needs a model, or the design has no number to change; or a learned metric cannot be
-            measured.
+        DraftError: the design is several or has no number to change, a name is unknown or given by
+            an expression, or a learned metric cannot be measured.
     """
     if design.count is not None:
         raise DraftError("sensitivities are of one design", "select one, such as `design[0]`")
     learned = tuple(dict.fromkeys(name for name in of if name in LEARNED))
     closed = tuple(name for name in of if name not in LEARNED)
-    metrics = () if learned and not closed else closed_metrics(closed)
+    metrics = () if learned and not closed else closed_metrics(closed, models=True)
     numbers = _chosen(design, by)
     values = np.array(list(numbers.values()))
     steps = np.array([step_of(design, *one) for one in numbers.items()])
@@ -204,15 +203,13 @@ def sensitivity(
     errors = sample_errors(design, samples, seed).repeated(1 + count).after(plain)
     arrays: dict[str, Value] = {name: rows[:, i] for i, name in enumerate(numbers)}
     many = design.spec.resolve(design.values, arrays, errors=errors)
-    found = of_design(many, metrics)
-    table = np.array([np.broadcast_to(found[name], many.count or 1) for name in metrics], float)
-    table = table.reshape(len(metrics), many.count or 1)
+    table = _measured(many, metrics)
     base = table[:, 0]
     moved = table[:, 1:plain].reshape(len(metrics), kinds, count).transpose(1, 2, 0)
     drawn = table[:, plain:].reshape(len(metrics), 1 + count, samples)
     with np.errstate(all="ignore"):  # A time without a limit has no change.
         change = np.where(known[..., None], moved - base, np.nan)  # (4, P, M)
-        change = np.where(abs(change) <= _STILL * abs(base), 0.0, change)
+        change = np.where(abs(change) <= STILL * abs(base), 0.0, change)
         relative = change[:2] / abs(base)
         apart = drawn[:, 1:] - drawn[:, :1]
     ends = np.quantile(apart, _ENDS, axis=2).swapaxes(1, 2)
@@ -260,8 +257,8 @@ def sensitivity(
         name: np.concatenate([getattr(result, name), own], axis=-1)[..., order]
         for name, own in more_columns.items()
     }
-    ordered = tuple(dict.fromkeys(of))
-    return replace(result, metrics=ordered, notes=effects.notes, **columns)
+    metrics = tuple(names[k] for k in order)
+    return replace(result, metrics=metrics, notes=effects.notes, **columns)
 
 
 def stated_numbers(design: Design) -> dict[str, float]:
@@ -317,8 +314,29 @@ def _allowed(design: Design, names: Sequence[str], moved: Array) -> NDArray[np.b
     return allowed
 
 
-def closed_metrics(of: Sequence[str]) -> tuple[str, ...]:
+def _measured(many: Design, metrics: Sequence[str]) -> Array:
+    """Metrics of N designs, shape (M, N); those of models NaN for designs without one."""
+    count = many.count or 1
+    closed = [name for name in metrics if find(name).needs == "design"]
+    found: dict[str, Value] = dict(of_design(many, closed))
+    rest = [name for name in metrics if name not in found]
+    if rest:
+        from draft.model.batch import build_batch
+
+        batch = build_batch(many, np.flatnonzero(np.broadcast_to(many.accepted, count)))
+        for name, values in of_batch(batch, rest).items():
+            found[name] = np.full(count, np.nan)
+            found[name][batch.rows] = values
+    table = np.array([np.broadcast_to(found[name], count) for name in metrics], float)
+    return table.reshape(len(metrics), count)
+
+
+def closed_metrics(of: Sequence[str], models: bool = False) -> tuple[str, ...]:
     """Metrics that need no model, all or those that are named.
+
+    Args:
+        of: names of metrics.
+        models: whether those of models that are built by arrays may be named too.
 
     Raises:
         DraftError: one is unknown, or needs a model or a policy.
@@ -328,8 +346,9 @@ def closed_metrics(of: Sequence[str]) -> tuple[str, ...]:
         return tuple(one.name for one in closed if one.unit != "bool")
     for name in of:
         metric = find(name)
-        if metric.needs != "design":
-            raise DraftError(needs_more(metric).cause, "omit it: sensitivities are of closed forms")
+        allowed = metric.needs == "design" or (models and metric.needs == "model" and metric.batch)
+        if not allowed:
+            raise DraftError(needs_more(metric).cause, "omit it: this takes closed forms")
     return tuple(dict.fromkeys(of))
 
 

@@ -14,6 +14,7 @@ from draft.explore.indices import Indices
 from draft.explore.sensitivity import Sensitivity
 from draft.metrics import find
 from draft.plotting import BLUE, COLUMN, GREY, ORANGE
+from draft.values import brief
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,17 +33,14 @@ def tornado(found: Sensitivity) -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-    columns = min(2, len(found.metrics))
-    rows = -(-len(found.metrics) // columns)
-    count = min(_MOST, int((~found.still).sum()))
-    figure = Figure(figsize=(columns * COLUMN, rows * (0.55 + 0.17 * max(count, 1))))
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in panels[len(found.metrics) :]:
-        axes.axis("off")
-    for k, (axes, name) in enumerate(zip(panels, found.metrics, strict=False)):
+    size = found.sizes
+    bars = [max(1, min(_MOST, count)) for count in (size > 0).sum(axis=0)]
+    heights = [0.6 + 0.17 * count for count in bars]
+    figure = Figure(figsize=(1.6 * COLUMN, sum(heights) + 0.2))
+    panels = figure.subplots(len(bars), 1, squeeze=False, height_ratios=heights).ravel()
+    for k, (axes, name) in enumerate(zip(panels, found.metrics, strict=True)):
         metric = find(name)
-        size = found.sizes[:, k]
-        order = [i for i in np.argsort(-size, kind="stable") if size[i] > 0]
+        order = [i for i in np.argsort(-size[:, k], kind="stable") if size[i, k] > 0]
         order = order[:_MOST][::-1]
         place = np.arange(len(order))
         for values, color in ((found.step_up, BLUE), (found.step_down, ORANGE)):
@@ -53,8 +51,9 @@ def tornado(found: Sensitivity) -> Figure:
         labels = [_label(found, i) for i in order]
         axes.set_yticks(place, labels)
         axes.axvline(0, color=GREY, lw=0.5)
-        unit = "" if metric.unit == "1" else f" [{metric.unit}]"
-        axes.set_xlabel(f"change of {metric.name}{unit}, now {found.base[k]:.3g}")
+        unit = "" if metric.unit == "1" else f" {metric.unit}"
+        axes.set_title(f"{metric.name}: {brief(found.base[k])}{unit} now", loc="left")
+        axes.set_xlabel(f"change{f' [{metric.unit}]' if unit else ''}")
     sides = [Patch(color=color, label=f"a step {word}") for color, word in _SIDES]
     figure.legend(handles=sides, loc="outside upper right", ncols=2)
     return figure

@@ -12,8 +12,10 @@ import ast
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 
 from draft.design import Design
 from draft.errors import DraftError
@@ -23,7 +25,7 @@ from draft.explore.sensitivity import stated_numbers
 from draft.explore.settings import Progress, TargetSettings
 from draft.metrics import LEARNED, find, of_design
 from draft.spec.expressions import syntax_tree
-from draft.values import Array, Value
+from draft.values import Array, Value, scalar, told_apart
 from draft.variation.axes import Axis, Vary, parse
 
 REACH = 2.0  # A number without a range of its own is varied from its half to its double.
@@ -85,6 +87,34 @@ class Solution:
     tried: int
     rollouts: int = 0
     notes: tuple[str, ...] = ()
+
+    def record(self) -> dict[str, Any]:
+        """Plain data."""
+        conflict = self.conflict
+        return {
+            "met": conflict is None,
+            "change": self.change,
+            "moved": [
+                {"name": one.name, "from": one.before, "to": one.after, "why": list(one.why)}
+                for one in self.moved
+            ],
+            "excluded_together": [] if conflict is None else list(conflict.conditions),
+            "misses": [] if conflict is None else list(conflict.misses),
+            "designs_computed": self.tried,
+            **({"rollouts": self.rollouts, "notes": list(self.notes)} if self.rollouts else {}),
+        }
+
+    def design_file(self, start: Design, conditions: Sequence[str]) -> str:
+        """Text of the design file: the values, and above them why each number moved."""
+        doc = f"Nearest to {start.reference} with {', '.join(conditions)}."
+        lines = []
+        for one in self.moved:
+            why = f"; else {'; '.join(one.why)}" if one.why else ""
+            lines.append(f"# {one.name}: {' -> '.join(told_apart(one.before, one.after))}{why}")
+        values = dict(start.values) | {one.name: one.after for one in self.moved}
+        document = {"doc": doc, "values": values}
+        text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=1000)
+        return "\n".join([*lines, text])
 
 
 def solve(
@@ -351,17 +381,21 @@ class Search:
 
     def _tidied(self, best: Array) -> Array:
         """The solution without changes that hardly matter, the others a little larger for it."""
-        most = _TIDY * np.linalg.norm(best)
-        for i in np.argsort(abs(best)):
-            fewer = best.copy()
-            fewer[i] = 0.0
-            drawn = self._inside(fewer * _LARGER[:, None])
-            drawn = drawn[np.linalg.norm(drawn, axis=1) <= most]
-            if not len(drawn):
-                continue
-            met = self._violations(drawn).sum(axis=1) == 0
-            if met.any():
-                best = drawn[met.argmax()]
+        most, before = _TIDY * np.linalg.norm(best), None
+        while before is None or (best != before).any():  # One less may make another needless.
+            before = best
+            for i in np.argsort(abs(best)):
+                if not best[i]:
+                    continue
+                fewer = best.copy()
+                fewer[i] = 0.0
+                drawn = self._inside(fewer * _LARGER[:, None])
+                drawn = drawn[np.linalg.norm(drawn, axis=1) <= most]
+                if not len(drawn):
+                    continue
+                met = self._violations(drawn).sum(axis=1) == 0
+                if met.any():
+                    best = drawn[met.argmax()]
         return best
 
     def _resolved(self, best: Array) -> Design:
@@ -405,9 +439,13 @@ class Search:
         if one.gap is None:
             return one.text
         left = one.text.split("<")[0].split(">")[0].strip()
-        side = next((s for s in one.gap if s.expression.text.strip() == left), one.gap[0])
-        value = float(np.asarray(side.value(design, self._measured(design, drawn, side.metrics))))
-        return f"{one.text}, and it is {value:.4g}"
+        values = [
+            scalar(side.value(design, self._measured(design, drawn, side.metrics)))
+            for side in one.gap
+        ]
+        if one.gap[0].expression.text.strip() != left:
+            values.reverse()
+        return f"{one.text}, and it is {told_apart(values[1], values[0])[1]}"
 
     def _measured(self, design: Design, drawn: Array, names: Sequence[str]) -> Mapping[str, Value]:
         del drawn

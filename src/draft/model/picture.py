@@ -46,6 +46,7 @@ DIRECTION = np.array([-0.6, 0.4])
 LAMP_SIZE, SKY_SIZE = 0.16, 0.9
 FIELD_OF_VIEW = 16  # [deg]
 MARGIN = 1.08
+GAP = 0.15  # between exhibits of a row [m]
 # Azimuth and elevation of the camera [deg], in MuJoCo's convention.
 View = tuple[float, float]
 # Colours [0 to 1], shape (..., 3), of places on the floor [m], shape (..., 2); NaN for none there.
@@ -82,6 +83,16 @@ def exhibit(model: Model, place: tuple[float, float] = (0.0, 0.0), yaw: float = 
     height = scalar(design.lowest(home=True))
     robot = mujoco.MjSpec.from_string(model.xml)
     return Exhibit(robot, "floating_base", height, home, place, yaw)
+
+
+def row(models: Sequence[Model], yaw: float) -> list[Exhibit]:
+    """Exhibits side by side along y, all turned by `yaw` [rad]."""
+    edge, shown = 0.0, []
+    for model in models:
+        y = corners(*stage([exhibit(model, yaw=yaw)]))[:, 1]
+        shown.append(exhibit(model, (0.0, edge - float(y.min())), yaw))
+        edge += float(np.ptp(y)) + GAP
+    return shown
 
 
 def draw(

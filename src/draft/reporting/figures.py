@@ -16,8 +16,9 @@ from draft.fitting.actuators import catalogue_figures as trends
 from draft.fitting.actuators.catalogue_rows import rows_of
 from draft.laws.catalogue import catalogue
 from draft.laws.quantities import QUANTITIES
-from draft.model.picture import Exhibit, Pixels, corners, exhibit, stage
+from draft.model.picture import Pixels
 from draft.model.picture import draw as render
+from draft.model.picture import row as side_by_side
 from draft.reporting import dots, plots
 from draft.reporting.plots import PALETTE, parts
 from draft.reporting.scene3d import YAW
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 PAGE = 2 * plotting.COLUMN
 SIZE = (1500, 600)
 VIEW = (180, -9)
-_GAP = 0.15
 _DOT = 0.04  # width of a dot of a dot plot as a share of its scale
 _MARKS = ("o", "s", "D", "^", "P", "*")
 
@@ -65,16 +65,8 @@ def draw(folder: Path, subjects: Sequence[Subject]) -> list[Path]:
 
 def picture(subjects: Sequence[Subject]) -> Pixels | None:
     """Render the robots in a row, shape (height, width, 3); None if none has a model."""
-    edge = 0.0
-    row: list[Exhibit] = []
-    for subject in subjects:
-        if subject.model is None:
-            continue
-        turned = exhibit(subject.model, yaw=YAW)
-        y = corners(*stage([turned]))[:, 1]
-        row.append(exhibit(subject.model, (0.0, edge - float(y.min())), YAW))
-        edge += float(np.ptp(y)) + _GAP
-    return render(row, VIEW, SIZE) if row else None
+    shown = side_by_side([one.model for one in subjects if one.model is not None], YAW)
+    return render(shown, VIEW, SIZE) if shown else None
 
 
 def robots(subjects: Sequence[Subject], pixels: Pixels) -> Figure:

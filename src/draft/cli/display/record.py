@@ -32,29 +32,17 @@ class Clock:
 def record(
     design: Design, clock: Clock, out: Path | None, more: Mapping[str, Any] | None = None
 ) -> str:
-    """Return the object as text: verdict, masses, actuators, findings, timings, folder, more."""
+    """Return the object as text: that of `summary`, timings, folder, more."""
     # Options of all commands bring this module: not all of those need MuJoCo.
+    from draft.design.report import summary
     from draft.values import plain
 
-    actuators = {
-        name: {"like": actuator.like} | {key: getattr(actuator, key) for key in actuator.quantities}
-        for name, actuator in design.actuators.items()
-    }
     return json.dumps(
-        plain(
-            {
-                "name": design.name,
-                "design": design.label,
-                "mass_kg": design.mass,
-                "n_joints": len(design.joints),
-                "accepted": design.accepted,
-                "findings": [finding.record() for finding in design.findings],
-                "actuators": actuators,
-                "bodies": design.body_masses(),
-                "timings_ms": {name: round(ms, 3) for name, ms in clock.laps.items()},
-                "out": str(out) if out is not None else None,
-                **(more or {}),
-            }
-        ),
+        {
+            **summary(design),
+            "timings_ms": {name: round(ms, 3) for name, ms in clock.laps.items()},
+            "out": str(out) if out is not None else None,
+            **plain(more or {}),
+        },
         indent=2,
     )
