@@ -28,21 +28,22 @@ from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.measuring.evaluation_options import BodyRollOuts
 from draft.learn.measuring.learned_metrics import walkers
-from draft.learn.measuring.paired_metrics import RESAMPLES, paired
+from draft.learn.measuring.paired_metrics import RESAMPLES, Paired, paired
 from draft.metrics import of_design
 from draft.values import Array, Value
 from draft.variation.axes import Axis
 
 _INSIDE = "learned.inside"
 _PAIRS, _STEP = 12, 0.06  # Of the first batch: pairs of designs, and their change.
-_EACH, _ROUNDS = 14, 3  # Bodies of a round; rounds.
-_LAST = 3  # Batches of a solution with one number as it was.
-_BASE = 16  # Roll-outs of the given design, over those of others.
+_EACH, _ROUNDS = 10, 3  # Bodies of a round; rounds.
+_BASE = 16  # Roll-outs of the given design, over those of a first look.
+_NEAREST, _TIMES = 2, 3  # Designs that are looked at again, and by how many roll-outs more.
+_LAST = 4  # Batches of a solution with one number as it was.
 _SURE = 1.645  # Standard deviations that a normal number exceeds in 5 % of cases.
 _NOISE = 1e-2  # Standard deviation of a gap by roll-outs, over that of its slopes.
 _NEAR = 0.25  # Least distance over which predictions are fitted.
 _WIDTH, _SHRINK = 0.3, 0.6  # Of a round's designs around its target, over its change.
-_PULLS = (1.0, 1.08, 0.92, 1.2, 0.84, 0.7)
+_PULLS, _MORE = (1.08, 0.92, 1.2, 0.84, 0.7), 1.1
 _WORST = 1.0  # Gap of a robot that falls.
 _ONLY_FIRST = np.array([0])
 
@@ -55,6 +56,7 @@ class _Rolled(NamedTuple):
         gap: gap of each learned condition, above zero where it is not met, shape (N, conditions).
         deviation: standard deviation of the gap by chance, same shape.
         closed: violation of the conditions in closed form, shape (N,).
+        times: roll-outs, over those of a first look, shape (N,).
         values: learned metrics, shape (N, metrics).
     """
 
@@ -62,6 +64,7 @@ class _Rolled(NamedTuple):
     gap: Array
     deviation: Array
     closed: Array
+    times: Array
     values: Array
 
 
@@ -80,13 +83,14 @@ class RolledOutSearch(Search):
         super().__init__(design, conditions, axes, rng)
         self._source = open_policy(design, settings)
         self._report = settings.progress or silent
-        self._rollouts = BodyRollOuts.of({"replicas": settings.replicas, "seed": seed})
+        self._replicas, self._seed = settings.replicas, seed
         self._learned = tuple(one for one in conditions if by_rollouts(one))
         self._closed = tuple(one for one in conditions if one not in self._learned)
         named = {name for one in self._learned for name in one.holds.metrics}
         self._names = (*sorted(named - {*self._metrics, _INSIDE}), _INSIDE)
         self._outside = self._source.warning(legged_robot(design))
-        self._done, self._base, self._own = 0, {}, {}
+        self._done = 0
+        self._base: dict[str, tuple[float, Array]] = {}
         count = len(axes)
         self._rolled: _Rolled | None = None
         self._seen = np.zeros((0, count)), np.zeros((0, len(self._source.region.low)))
@@ -100,8 +104,9 @@ class RolledOutSearch(Search):
             centre, violation = self._nearest(self._closed)
             if violation.any():  # No roll-out can help.
                 return Search(self._design, self._closed, self._axes, self._rng).run()
-        first = np.concatenate([zero, centre[None] if centre.any() else zero[:0]])
-        rolled = self._roll(np.concatenate([first, self._spread(centre)]))
+        first = [centre[None]] if centre.any() else []
+        self._look(np.concatenate([*first, self._spread(centre)]))
+        rolled = self._known
         if np.isnan(rolled.values[0]).any():
             missing = [
                 name for name, x in zip(self._names, rolled.values[0], strict=True) if np.isnan(x)
@@ -118,23 +123,28 @@ class RolledOutSearch(Search):
             target, violation = self._nearest(self._conditions)
             if not violation.any():
                 target = self._tidied(target)
-            self._roll(self._around(target, centre, _WIDTH * _SHRINK**k))
+            self._look(self._around(target, centre, _WIDTH * _SHRINK**k))
         best = self._best()
-        if best is None:
-            known = tuple(one.text for one in self._conditions if one.text != "accepted")
-            least = self._least()
-            together = self._smallest() if violation.any() else known
-            return self._solution(least, Conflict(together, self._misses(least)))
+        if best is not None:
+            self._look(self._walking(self._screened(_sparser(best))))
         for _ in range(_LAST):
+            best = self._best()
+            if best is None:
+                break
             changed = np.flatnonzero(best)
             without = np.repeat(best[None], len(changed), axis=0)
             without[np.arange(len(changed)), changed] = 0.0
-            self._roll(without[self._places(without) < 0])
-            nearer = self._best()
-            if nearer is None or np.array_equal(nearer, best):
-                break
-            best = nearer
-        return self._solution(best, None)
+            self._look(self._walking(without))
+            after = self._best()
+            if after is not None and np.array_equal(after, best):
+                return self._solution(best, None)
+        best = self._best()
+        if best is not None:
+            return self._solution(best, None)
+        least = self._least()
+        known = tuple(one.text for one in self._conditions if one.text != "accepted")
+        together = self._smallest() if violation.any() else known
+        return self._solution(least, Conflict(together, self._misses(least)))
 
     def _solution(self, best: Array, conflict: Conflict | None) -> Solution:
         notes = ()
@@ -156,14 +166,14 @@ class RolledOutSearch(Search):
         turned = np.linalg.qr(self._rng.normal(size=(count, count)))[0][:, : len(centre)]
         step = _STEP * np.sqrt(count) * turned[:_PAIRS]
         drawn = self._inside(centre + np.concatenate([step, -step]))
-        accepted = self._violations(drawn, self._closed)[:, -1] == 0
-        drawn = np.where(accepted[:, None], drawn, centre + (drawn - centre) / 2)
-        self._walking(drawn)  # Their features tell where the region ends.
-        return drawn
+        walking = self._walking(drawn)
+        others = drawn[~(drawn[:, None] == walking).all(axis=2).any(axis=1)]
+        return np.concatenate([walking, self._walking(centre + (others - centre) / 2)])
 
     def _around(self, target: Array, centre: Array, width: float) -> Array:
         """Designs of a round: around a target, and between a known design and the given one."""
-        rows = [target * pull for pull in _PULLS]
+        few = _sparser(target)[-3:-1] * _MORE
+        rows = [target, *few, *(target * pull for pull in _PULLS)]
         rows += [centre * pull for pull in (0.95, 0.85, 0.7)] + [(centre + target) / 2]
         rows = [row for row in rows if row.any()]
         scale = np.sqrt(np.mean(target**2))
@@ -173,7 +183,6 @@ class RolledOutSearch(Search):
             rows += [*(middle + aside * (self._rng.random(shape) < 0.5))]
         drawn = self._walking(self._screened(self._inside(np.array(rows))))
         drawn = drawn[np.sort(np.unique(drawn, axis=0, return_index=True)[1])]
-        drawn = drawn[self._places(drawn) < 0]
         first, rest = drawn[: _EACH // 2], drawn[_EACH // 2 :]
         return np.concatenate([first, self._rng.permutation(rest)[: _EACH - len(first)]])
 
@@ -201,43 +210,67 @@ class RolledOutSearch(Search):
         ]
         return drawn[rows[inside]]
 
-    def _roll(self, drawn: Array) -> _Rolled:
-        """Roll out designs, and add them to those of before; the given one is the first of all."""
-        if not len(drawn):
-            return self._known
+    def _look(self, drawn: Array) -> None:
+        """Roll out designs, and again the nearest that may be solutions, more often."""
+        new = drawn[self._places(drawn) < 0] if self._rolled is not None else drawn
+        self._roll(new)
+        known, best = self._known, self._best()
+        size = np.linalg.norm(known.drawn, axis=1)
+        most = np.inf if best is None else float(np.linalg.norm(best))
+        hopeful = (known.gap <= 0).all(axis=1) & (known.closed == 0) & (known.times == 1)
+        rows = np.flatnonzero(hopeful & (size > 0) & (size <= most))
+        if len(rows):
+            self._roll(known.drawn[rows[np.argsort(size[rows], kind="stable")[:_NEAREST]]], _TIMES)
+
+    def _roll(self, drawn: Array, times: int = 1) -> None:
+        """Roll out designs with the given one, and keep them in the place of a look before.
+
+        The given design is the first that is kept.
+        """
+        if not len(drawn) and self._rolled is not None:
+            return
+        drawn = np.concatenate([np.zeros((1, len(self._axes))), drawn])
         many = self._design.spec.resolve(self._design.values, self._values(drawn))
-        found = paired(self._source, many, self._names, self._rollouts, self._report)
-        self._done += found.rollouts
+
+        def rolled(times: int, rows: NDArray[np.intp] | None = None) -> Paired:
+            more = {"replicas": times * self._replicas, "seed": self._seed}
+            found = paired(
+                self._source, many, self._names, BodyRollOuts.of(more), self._report, rows
+            )
+            self._done += found.rollouts
+            return found
+
+        found = rolled(times)
         if not self._base:
-            more = {"replicas": _BASE * self._rollouts.replicas, "seed": self._rollouts.seed}
-            base = paired(self._source, many, self._names, BodyRollOuts.of(more), rows=_ONLY_FIRST)
-            self._done += base.rollouts
+            base = rolled(_BASE, np.array([0]))
             for name in self._names:
-                self._base[name] = base.values[name][0], base.resampled[name][:, 0]
-                self._own[name] = found.values[name][0], found.resampled[name][:, 0]
-        values = {n: x + self._base[n][0] - self._own[n][0] for n, x in found.values.items()}
-        again = {
-            n: x + (self._base[n][1] - self._own[n][1])[:, None] for n, x in found.resampled.items()
-        }
+                self._base[name] = float(base.values[name][0]), base.resampled[name][:, 0]
+        values, again = {}, {}
+        for name, (value, resampled) in self._base.items():
+            own, own_again = found.values[name], found.resampled[name]
+            values[name] = value + own - own[0]
+            again[name] = resampled[:, None] + own_again - own_again[:, :1]
         closed = of_design(many, self._metrics)
 
         def gaps(learned: dict[str, Array]) -> Array:
             each = [self._gap(one, many, {**closed, **learned}) for one in self._learned]
             return np.stack(each, axis=1)
 
-        spread = np.std([gaps({n: x[k] for n, x in again.items()}) for k in range(RESAMPLES)], 0)
-        more_rows = _Rolled(
+        more = _Rolled(
             drawn,
             gaps(values),
-            spread,
+            np.std([gaps({n: x[k] for n, x in again.items()}) for k in range(RESAMPLES)], axis=0),
             self._violations(drawn, self._closed).sum(axis=1),
+            np.full(len(drawn), times),
             np.stack([values[name] for name in self._names], axis=1),
         )
         if self._rolled is not None:
-            pairs = zip(self._rolled, more_rows, strict=True)
-            more_rows = _Rolled(*(np.concatenate(pair) for pair in pairs))
-        self._rolled = more_rows
-        return more_rows
+            taken = self._places(drawn)
+            kept = np.ones(len(self._rolled.drawn), dtype=bool)
+            kept[taken[taken > 0]] = False
+            pairs = zip(self._rolled, more, strict=True)
+            more = _Rolled(*(np.concatenate([a[kept], b[1:]]) for a, b in pairs))
+        self._rolled = more
 
     def _gap(self, one: Constraint, many: Design, metrics: Mapping[str, Value]) -> Array:
         """Smaller less larger side of a condition, over the larger; 1 where it is undefined."""
@@ -261,7 +294,8 @@ class RolledOutSearch(Search):
         """Gaps that the designs rolled out so far exceed in 5 % of cases, shape as `gap`."""
         known = self._known
         # The deviation of one body by few roll-outs may be too small by chance.
-        return known.gap + _SURE * np.maximum(known.deviation, np.median(known.deviation, axis=0))
+        least = np.median(known.deviation, axis=0) / np.sqrt(known.times)[:, None]
+        return known.gap + _SURE * np.maximum(known.deviation, least)
 
     def _best(self) -> Array | None:
         """The nearest design that meets all conditions, of those that were rolled out."""
@@ -291,7 +325,10 @@ class RolledOutSearch(Search):
             return super()._violation(one, drawn, many, found)
         known, place = self._known, self._learned.index(one)
         inputs = _inputs(drawn)
-        gap = inputs @ self._fits[0][:, place] + _SURE * np.median(known.deviation[:, place])
+        chance = np.median(known.deviation[:, place]) / np.sqrt(_TIMES)
+        gap = inputs @ self._fits[0][:, place] + _SURE * chance
+            known.deviation[:, place]
+        ) / np.sqrt(_TIMES)
         if not self._outside:
             low, high = np.array(self._source.region.low), np.array(self._source.region.high)
             features = inputs @ self._fits[1]
@@ -323,6 +360,18 @@ class RolledOutSearch(Search):
         closed = of_design(design, [name for name in names if name not in self._names])
         values = self._known.values[self._places(drawn[None])[0]].tolist()
         return {**closed, **dict(zip(self._names, values, strict=True))}
+
+
+def _sparser(drawn: Array) -> Array:
+    """A design with more and more of its numbers as they were, the smallest changes first."""
+    order = np.argsort(abs(drawn))
+    changed = order[drawn[order] != 0]
+    return np.array(
+        [
+            np.where(np.isin(np.arange(len(drawn)), changed[:k]), 0.0, drawn)
+            for k in range(1, max(len(changed), 2))
+        ]
+    )
 
 
 def _inputs(drawn: Array) -> Array:
