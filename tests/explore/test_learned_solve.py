@@ -76,7 +76,7 @@ def test_a_solution_meets_all_at_little_more_than_the_least_change(seed: int) ->
     assert 0.5 * alone.change < found.change < 2.5 * alone.change
     why = {one.name: one.why for one in found.moved}["actuators.leg.peak_torque"]
     assert re.match(rf"{re.escape(SPEED)} >= 3.9, and it is 3\.\d+ ± 0\.\d+", why[0])
-    assert 500 < found.rollouts < 1500
+    assert 500 < found.rollouts < 2500
 
 
 def test_equal_seeds_give_equal_solutions() -> None:
@@ -125,7 +125,7 @@ def test_conditions_that_make_no_sense_are_refused(conditions: list[str], messag
 
 
 def test_a_robot_that_the_policy_does_not_drive_is_refused() -> None:
-    with pytest.raises(DraftError, match="does not drive the joints of hopper"):
+    with pytest.raises(DraftError, match="hopper cannot be trained: it has one leg"):
         draft.solve(draft.load("hopper").resolve(), [f"{SPEED} >= 3.9"])
 
 

@@ -327,8 +327,6 @@ class RolledOutSearch(Search):
         inputs = _inputs(drawn)
         chance = np.median(known.deviation[:, place]) / np.sqrt(_TIMES)
         gap = inputs @ self._fits[0][:, place] + _SURE * chance
-            known.deviation[:, place]
-        ) / np.sqrt(_TIMES)
         if not self._outside:
             low, high = np.array(self._source.region.low), np.array(self._source.region.high)
             features = inputs @ self._fits[1]
