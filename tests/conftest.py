@@ -47,6 +47,7 @@ SLOW = (
     "cli/test_train.py",
     "cli/test_verdict_of_training.py",
     "explore/test_engines.py",
+    "explore/test_learned_effects.py",
     "imports/test_bad_descriptions.py",
     "model/test_mujoco_log.py",
     "reporting/test_browser.py",

@@ -116,7 +116,7 @@ def test_a_step_is_about_a_tenth_and_has_one_digit(value: float) -> None:
     ("of", "by", "message"),
     [
         (["mas"], [], "there is no metric 'mas'"),
-        (["learned.top_speed"], [], "'learned.top_speed' needs a policy"),
+        (["learned.topspeed"], [], "there is no metric 'learned.topspeed'"),
         (["mass"], ["thigh"], "'thigh' is not a parameter"),
         (["mass"], ["abduction_length"], "'abduction_length' follows from 'leg.length + 1.1 *"),
         (["mass"], ["actuators.leg.mass"], "does not state 'actuators.leg.mass'"),

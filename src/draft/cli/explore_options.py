@@ -39,7 +39,7 @@ OfMetrics = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
         metavar="METRIC ...",
-        help="Metrics ('draft metrics' lists them), none that needs a policy.",
+        help="Metrics, which 'draft metrics' lists.",
         help_behavior_hint=f"(default: {', '.join(USUAL)})",
     ),
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as jsons
 import math
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,9 +14,12 @@ from rich.text import Text
 
 from draft.cli import explore_options as x
 from draft.cli.display.verdict import console, verdict
+from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
+from draft.cli.settings_options import with_options
 from draft.errors import DraftError
-from draft.metrics import find
+from draft.explore.settings import EffectSettings
+from draft.metrics import LEARNED, find
 from draft.metrics.registry import USUAL
 from draft.values import brief, signed
 
@@ -23,9 +27,11 @@ if TYPE_CHECKING:
     from draft.design import Design
     from draft.explore.sensitivity import Sensitivity
 
+_CHANCE = "~0"  # A change that chance may explain.
 _NUMBER, _CELL = 44, 28  # Width of the first columns of a table, and of a metric.
 
 
+@with_options(EffectSettings, without=("progress",))
 def main(
     reference: DesignArgument,
     /,
@@ -66,9 +72,13 @@ def main(
             help_behavior_hint="(default: no figure)",
         ),
     ] = None,
+    rolled: EffectSettings,
     json: JsonOutput = False,
 ) -> int:
     """Show what a change of each number of a design does to its metrics, and how sure that is.
+
+    Learned metrics are measured by roll-outs of the design and of a step more and less of each
+    number (the extra learn; about half a minute for ten numbers).
 
     With --vary it is over ranges: Sobol indices, the shares of the variance of each metric that a
     number explains alone, and that it has a part in (extra explore).
@@ -80,7 +90,21 @@ def main(
         if by:
             raise DraftError("--by names single numbers, and --vary ranges", "omit one of them")
         return _over_ranges(resolved, vary, screen, of, n, seed, figure, json)
-    found = sensitivity(resolved, of or (() if json else USUAL), by, seed=seed)
+    learned = any(name in LEARNED for name in of)
+    if learned:
+        x.print_policy(rolled.policy)
+    elif rolled.policy is not None:
+        raise DraftError("--policy is for learned metrics", "add --of learned.top_speed")
+    with if_interrupted(NOTHING), x.bar("bodies") if learned else nullcontext() as progress:
+        found = sensitivity(
+            resolved,
+            of or (() if json else USUAL),
+            by,
+            seed=seed,
+            replicas=rolled.replicas,
+            policy=rolled.policy,
+            progress=progress,
+        )
     if figure is not None:
         from draft.explore.sensitivity_figure import save
 
@@ -148,23 +172,31 @@ def _print(found: Sensitivity) -> None:
     out = console()
     out.print(Text(verdict(found.design), style="bold"))
     shown = [i for i, still in enumerate(found.still) if not still]
+    if found.learned.any():  # The largest effects first.
+        first = int(found.learned.argmax())
+        shown.sort(key=lambda i: -found.sizes[i, first])
     wide = max(1, (out.width - _NUMBER) // _CELL)
     for start in range(0, len(found.metrics), wide):
         chosen = range(start, min(start + wide, len(found.metrics)))
         out.print("", _table(found, shown, chosen))
     if still := [name for name, one in zip(found.names, found.still, strict=True) if one]:
-        out.print(f"\nwithout effect: {', '.join(still)}", markup=False)
+        words = "without effect" if not found.learned.any() else "no effect beyond chance"
+        out.print(f"\n{words}: {', '.join(still)}", markup=False)
     for i in shown:
         for step, text in ((0, "less"), (2, "more")):
             if found.accepted[i, step] != found.accepted[i, 1]:
                 word = "accepts" if found.accepted[i, step] else "refuses"
                 size = f"{brief(found.steps[i])} {found.units[i]}".rstrip()
                 out.print(f"{found.names[i]}: {size} {text}, and the filter {word} it")
+    for note in found.notes:
+        out.print(note, style="dim", markup=False)
 
 
 def _table(found: Sensitivity, shown: list[int], chosen: range) -> Table:
     """One row per number: its step, and of each metric the change and the change of 1 %."""
     title = "change for a step (90 % band of it by the laws' errors), and for 1 % more"
+    if found.learned.any():
+        title += "; of learned metrics for a step (95 % interval over roll-outs)"
     table = Table(box=None, pad_edge=False, title=title, title_justify="left", title_style="dim")
     table.add_column("number", style="bold", no_wrap=True)
     table.add_column("value", justify="right", no_wrap=True)
@@ -185,8 +217,12 @@ def _cell(found: Sensitivity, i: int, k: int) -> str:
     other = -found.step_down[i, k]
     if math.isnan(change) and math.isnan(other):
         return "-"
-    if change == other == 0:
+    if change == other == 0 or not found.sizes[i, k]:
         return ""
+    if found.learned[k]:
+        more = _side(change, found.low[i, k], found.high[i, k])
+        less = _side(other, -found.down_high[i, k], -found.down_low[i, k])
+        return more if more != _CHANCE and not found.kinked[i, k] else f"{more} | {less}"
     text = signed(change)
     if found.kinked[i, k]:
         text += f" | {signed(other)}"
@@ -195,6 +231,13 @@ def _cell(found: Sensitivity, i: int, k: int) -> str:
         text += f" ({signed(low)}..{signed(high)})"
     percent = found.up[i, k]
     return f"{text}\n{100 * percent:+.2g} %" if percent and not math.isnan(percent) else text
+
+
+def _side(change: float, low: float, high: float) -> str:
+    """A change by roll-outs with its interval, if that excludes zero."""
+    if math.isnan(change):
+        return "-"
+    return f"{signed(change)} ({signed(low)}..{signed(high)})" if low > 0 or high < 0 else _CHANCE
 
 
 def _short(name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as jsons
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +13,12 @@ from rich.text import Text
 
 from draft.cli import explore_options as x
 from draft.cli.display.verdict import console, verdict
+from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
+from draft.cli.settings_options import with_options
+from draft.errors import DraftError
+from draft.explore.settings import TargetSettings
+from draft.metrics.learned import PREFIX
 from draft.values import told_apart
 
 if TYPE_CHECKING:
@@ -22,13 +28,14 @@ if TYPE_CHECKING:
 NOT_MET = 1
 
 
+@with_options(TargetSettings, without=("progress",))
 def main(
     reference: DesignArgument,
     conditions: Annotated[
         tuple[str, ...],
         tyro.conf.arg(
             metavar="CONDITION ...",
-            help='Conditions on closed-form metrics, such as "top_speed >= 3" "mass <= 30".',
+            help='Conditions on metrics: "top_speed >= 3" "mass <= 30" "learned.top_speed >= 4".',
             help_behavior_hint="(required)",
         ),
     ] = (),
@@ -57,18 +64,36 @@ def main(
             help_behavior_hint="(default: out/DESIGN-solved.yaml)",
         ),
     ] = None,
+    rolled: TargetSettings,
     json: JsonOutput = False,
 ) -> int:
     """Find the nearest accepted design that meets conditions, and say why each number moved.
 
     The change is the root mean square of those of the numbers, each as a share of its range.
     Without --vary every stated number may be halved to doubled, within the range of its parameter.
+    Learned conditions need roll-outs (the extra learn): of about 120 designs in batches, the
+    nearest that the predictions from the former ones find; about a minute.
     """
     from draft import files
     from draft.explore.solve import solve
 
     resolved, _ = open_design(reference, design, values, payload)
-    found = solve(resolved, conditions, vary, keep, seed=seed)
+    learned = any(PREFIX in text for text in conditions)
+    if learned:
+        x.print_policy(rolled.policy)
+    elif rolled.policy is not None:
+        raise DraftError("--policy is for learned metrics", "name one, or omit it")
+    with if_interrupted(NOTHING), x.bar("bodies") if learned else nullcontext() as progress:
+        found = solve(
+            resolved,
+            conditions,
+            vary,
+            keep,
+            seed=seed,
+            replicas=rolled.replicas,
+            policy=rolled.policy,
+            progress=progress,
+        )
     path = None
     if found.conflict is None and found.moved:
         name = resolved.reference.replace(":", "-")
@@ -107,6 +132,10 @@ def _print(start: Design, found: Solution, path: Path | None) -> None:
         row = one.name, *told_apart(one.before, one.after), "\n".join(one.why)
         table.add_row(*(Text(cell) for cell in row))
     out.print("", table, "")
-    out.print(f"change {100 * found.change:.3g} % of the ranges, {found.tried:,} designs computed")
+    rolled = f", {found.rollouts:,} roll-outs" if found.rollouts else ""
+    computed = f"{found.tried:,} designs computed{rolled}"
+    out.print(f"change {100 * found.change:.3g} % of the ranges, {computed}")
+    for note in found.notes:
+        out.print(note, style="yellow", markup=False)
     if path is not None:
         out.print(str(path), markup=False)

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 from draft.design import Design
 from draft.design.error_samples import sample_errors
 from draft.errors import DraftError, suggest
-from draft.metrics import METRICS, find, of_design
+from draft.explore.settings import EffectSettings, Progress
+from draft.metrics import LEARNED, METRICS, find, of_design
 from draft.metrics.measure import needs_more, of_batch
 from draft.metrics.registry import reads_verdict
 from draft.spec.check import key_problem
@@ -32,6 +34,8 @@ _ENDS = (0.05, 0.95)
 _SHARE = 0.1  # A designer's step, about this share of a number.
 _DIGITS = (1.0, 2.0, 5.0, 10.0)
 STILL = 1e-9  # Relative change that is rounding.
+_COLUMNS = ("up", "down", "step_up", "step_down", "low", "high")
+_DOWN = ("down_low", "down_high")
 _KINK = 0.1  # Difference of both sides, over the larger, from which both are shown.
 
 
@@ -52,9 +56,12 @@ class Sensitivity:
             zero has no per cent.
         step_up, step_down: change of each metric for a step more, and for one less, in the unit of
             the metric, shape (P, M).
-        low, high: ends of the 90 % band of `step_up` over the errors of the laws, shape (P, M).
+        low, high: ends of the 90 % band of `step_up` over the errors of the laws, shape (P, M); of
+            a learned metric, of its 95 % interval over roll-outs.
+        down_low, down_high: those of `step_down` of learned metrics; NaN of others.
         accepted: whether the filter accepts each design with a step less, as it is, and with a step
             more, shape (P, 3).
+        notes: sentences on the learned metrics.
     """
 
     design: Design
@@ -71,26 +78,48 @@ class Sensitivity:
     low: Array
     high: Array
     accepted: NDArray[np.bool_]
+    down_low: Array
+    down_high: Array
+    notes: tuple[str, ...] = ()
+
+    @property
+    def learned(self) -> NDArray[np.bool_]:
+        """Metrics that are measured by roll-outs, shape (M,)."""
+        return np.array([name in LEARNED for name in self.metrics], dtype=bool)
+
+    @property
+    def sizes(self) -> Array:
+        """Size of the larger side of each effect, shape (P, M).
+
+        It is 0 where neither changes; a side of a learned metric counts if its interval excludes 0.
+        """
+        sides = (
+            (self.step_up, self.low, self.high),
+            (self.step_down, self.down_low, self.down_high),
+        )
+        found = [
+            np.where(self.learned & ~((low > 0) | (high < 0)), 0.0, np.nan_to_num(abs(side)))
+            for side, low, high in sides
+        ]
+        return np.maximum(*found)
 
     @property
     def still(self) -> NDArray[np.bool_]:
-        """Numbers that change no metric, shape (P,)."""
-        moves = [
-            np.nan_to_num(abs(one)) > STILL * np.maximum(abs(self.base), 1e-300)
-            for one in (self.step_up, self.step_down)
-        ]
+        """Numbers that change no metric, as far as roll-outs can tell, shape (P,)."""
         flips = (self.accepted != self.accepted[:, 1:2]).any(axis=1)
-        return ~((moves[0] | moves[1]).any(axis=1) | flips)
+        return ~((self.sizes > 0).any(axis=1) | flips)
 
     @property
     def kinked(self) -> NDArray[np.bool_]:
-        """Whether both sides of a step differ by more than a tenth, shape (P, M)."""
+        """Whether both sides of a step differ by more than a tenth, and chance, shape (P, M)."""
         up, down = self.step_up, -self.step_down
         larger = np.fmax(abs(up), abs(down))
-        return abs(up - down) > _KINK * larger
+        chance = (self.high - self.low + self.down_high - self.down_low) / 2
+        return abs(up - down) > np.fmax(_KINK * larger, np.where(self.learned, chance, 0.0))
 
     def record(self) -> dict[str, object]:
         """Plain data; None where there is no number."""
+        by_rollouts = self.learned.any()
 
         def row(values: Array) -> dict[str, float | None]:
             known = (float(x) if math.isfinite(x) else None for x in values)
@@ -106,7 +135,7 @@ class Sensitivity:
                     "step": float(self.steps[i]),
                     **{
                         key: row(getattr(self, key)[i])
-                        for key in ("up", "down", "step_up", "step_down", "low", "high")
+                        for key in _COLUMNS + (_DOWN if by_rollouts else ())
                     },
                     "accepted": dict(
                         zip(("step_down", "now", "step_up"), self.accepted[i].tolist(), strict=True)
@@ -114,6 +143,7 @@ class Sensitivity:
                 }
                 for i, name in enumerate(self.names)
             },
+            **({"notes": list(self.notes)} if by_rollouts else {}),
         }
 
 
@@ -125,8 +155,11 @@ def sensitivity(
     samples: int = SAMPLES,
     seed: int = 0,
     verdicts: bool = True,
+    replicas: int = 12,
+    policy: str | Path | None = None,
+    progress: Progress | None = None,
 ) -> Sensitivity:
-    """Effects of a design's numbers on its metrics, of those that need no policy.
+    """Effects of a design's numbers on its metrics.
 
         >>> found = draft.sensitivity(draft.load("quadruped").resolve("bear"), of=["mass"])
         >>> i = found.names.index("actuators.leg.peak_torque")
@@ -135,21 +168,28 @@ def sensitivity(
 
     Args:
         design: one design.
-        of: metrics; empty for all that need no model.
+        of: metrics; empty for all that need no model and no policy.
         by: parameters (`thigh_length`) and quantities of actuators (`actuators.leg.peak_torque`);
             empty for all that the design states as numbers.
         samples: samples of the errors of the laws.
-        seed: seed of the samples.
+        seed: seed of the samples, and of the roll-outs.
+        replicas: roll-outs of each body at each speed and kick, for learned metrics; each number
+            has two bodies.
+        policy: see `draft.metrics.of_policy`.
+        progress: called with the bodies rolled out and their number.
         verdicts: whether to run the filter on each design, which takes most of the time; without
             it all have the verdict of the design.
 
     Raises:
-        DraftError: the design is several, a name is unknown or given by an expression, a metric
-            needs a policy, or the design has no number to change.
+        DraftError: the design is several or has no number to change, a name is unknown or given by
+            an expression, or a learned metric cannot be measured.
     """
     if design.count is not None:
         raise DraftError("sensitivities are of one design", "select one, such as `design[0]`")
-    metrics, numbers = closed_metrics(of, models=True), _chosen(design, by)
+    learned = tuple(dict.fromkeys(name for name in of if name in LEARNED))
+    closed = tuple(name for name in of if name not in LEARNED)
+    metrics = () if learned and not closed else closed_metrics(closed, models=True)
+    numbers = _chosen(design, by)
     values = np.array(list(numbers.values()))
     steps = np.array([step_of(design, *one) for one in numbers.items()])
     moves = np.array([PER_CENT * values, -PER_CENT * values, steps, -steps])  # (4, P)
@@ -181,7 +221,8 @@ def sensitivity(
     low, high = np.where(known[2][:, None], ends, np.nan)
     accepted = np.broadcast_to((many if verdicts else design).accepted, many.count or 1)
     less, more = (accepted[1 + k * count + own] for k in (3, 2))
-    return Sensitivity(
+    none = np.full_like(low, np.nan)
+    result = Sensitivity(
         design=design,
         names=tuple(numbers),
         units=tuple(unit_of(design.spec, name) for name in numbers),
@@ -196,7 +237,33 @@ def sensitivity(
         low=low,
         high=high,
         accepted=np.stack([less, np.full(count, accepted[0]), more], axis=1),
+        down_low=none,
+        down_high=none,
     )
+    if not learned:
+        return result
+    from draft.explore.learned_effects import learned_effects
+
+    given = {"replicas": replicas, "policy": policy, "progress": progress}
+    effects = learned_effects(
+        design, numbers, steps, known[2:], learned, seed, EffectSettings.of(given)
+    )
+    unknown = np.full(effects.change.shape[1:], np.nan)
+    more_columns = {
+        "base": effects.base,
+        **dict.fromkeys(("up", "down"), unknown),
+        **dict(zip(("step_up", "step_down"), effects.change, strict=True)),
+        **dict(zip(("low", "down_low"), effects.low, strict=True)),
+        **dict(zip(("high", "down_high"), effects.high, strict=True)),
+    }
+    names = (*metrics, *learned)
+    order = [names.index(name) for name in dict.fromkeys(of)]
+    columns = {
+        name: np.concatenate([getattr(result, name), own], axis=-1)[..., order]
+        for name, own in more_columns.items()
+    }
+    metrics = tuple(names[k] for k in order)
+    return replace(result, metrics=metrics, notes=effects.notes, **columns)
 
 
 def stated_numbers(design: Design) -> dict[str, float]:
@@ -266,7 +333,8 @@ def _measured(many: Design, metrics: Sequence[str]) -> Array:
             of_all = np.full(count, np.nan)
             of_all[batch.rows] = values
             found[name] = of_all
-    return np.array([np.broadcast_to(found[name], count) for name in metrics], float)
+    table = np.array([np.broadcast_to(found[name], count) for name in metrics], float)
+    return table.reshape(len(metrics), count)
 
 
 def closed_metrics(of: Sequence[str], models: bool = False) -> tuple[str, ...]:

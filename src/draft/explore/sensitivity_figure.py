@@ -27,12 +27,13 @@ _SIDES = ((BLUE, "more"), (ORANGE, "less"))
 def tornado(found: Sensitivity) -> Figure:
     """Draw the changes of metrics for a step more (blue) and a step less (orange) of each number.
 
-    Black lines are the 90 % bands over the errors of the laws, for a step more.
+    Black lines are the 90 % bands over the errors of the laws, for a step more; of learned metrics
+    the 95 % intervals over roll-outs.
     """
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-    size = np.nan_to_num(np.fmax(abs(found.step_up), abs(found.step_down)))
+    size = found.sizes
     bars = [max(1, min(_MOST, count)) for count in (size > 0).sum(axis=0)]
     heights = [0.6 + 0.17 * count for count in bars]
     figure = Figure(figsize=(1.6 * COLUMN, sum(heights) + 0.2))

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, SkipValidation
 
-from draft.learn.measuring.evaluation_options import LearnedMetrics
+from draft.learn.measuring.evaluation_options import LearnedMetrics, SeeingPolicy
 from draft.settings import Settings, Shown
 from draft.variation.axes import Vary, ranges
 from draft.variation.sampling import Sampler
@@ -97,3 +97,20 @@ class SearchSettings(LearnedMetrics, Varied):
     """Database, which several processes may share."""
     figure: bool = False
     """Draw the front over all trials: front.png and front.pdf."""
+
+
+class EffectSettings(SeeingPolicy):
+    """Settings of learned metrics of bodies that are compared with each other."""
+
+    replicas: Annotated[int, Field(ge=2, le=1000), Shown("N")] = 12
+    """Roll-outs of each body at each speed and kick, for learned metrics."""
+    progress: Annotated[Progress | None, Field(exclude=True)] = None
+    """Called with the bodies rolled out and their number."""
+
+
+class TargetSettings(EffectSettings):
+    """Settings of learned metrics in a search for the nearest design."""
+
+    replicas: Annotated[int, Field(ge=2, le=1000), Shown("N")] = 6
+    """Roll-outs of each body at each speed and kick, for learned metrics; a search has about 120
+    bodies."""

@@ -9,8 +9,9 @@ and of the filter are no obstacle. Equal seeds give equal solutions.
 from __future__ import annotations
 
 import ast
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,8 @@ from draft.errors import DraftError
 from draft.explore import goals
 from draft.explore.goals import Constraint
 from draft.explore.sensitivity import stated_numbers
-from draft.metrics import of_design
+from draft.explore.settings import Progress, TargetSettings
+from draft.metrics import LEARNED, find, of_design
 from draft.spec.expressions import syntax_tree
 from draft.values import Array, Value, scalar, told_apart
 from draft.variation.axes import Axis, Vary, parse
@@ -74,6 +76,8 @@ class Solution:
         moved: the numbers that changed, the largest changes first.
         conflict: why no design meets all; None where one does.
         tried: designs that were computed.
+        rollouts: roll-outs for learned conditions.
+        notes: sentences on them.
     """
 
     design: Design
@@ -81,6 +85,8 @@ class Solution:
     moved: tuple[Moved, ...]
     conflict: Conflict | None
     tried: int
+    rollouts: int = 0
+    notes: tuple[str, ...] = ()
 
     def record(self) -> dict[str, Any]:
         """Plain data."""
@@ -95,6 +101,7 @@ class Solution:
             "excluded_together": [] if conflict is None else list(conflict.conditions),
             "misses": [] if conflict is None else list(conflict.misses),
             "designs_computed": self.tried,
+            **({"rollouts": self.rollouts, "notes": list(self.notes)} if self.rollouts else {}),
         }
 
     def design_file(self, start: Design, conditions: Sequence[str]) -> str:
@@ -117,6 +124,9 @@ def solve(
     keep: Sequence[str] = (),
     *,
     seed: int = 0,
+    replicas: int = 6,
+    policy: str | Path | None = None,
+    progress: Progress | None = None,
 ) -> Solution:
     """Find the nearest accepted design that meets all conditions.
 
@@ -127,24 +137,39 @@ def solve(
 
     Args:
         design: one design.
-        conditions: expressions of closed-form metrics, parameters and values of actuators, as
-            `where` of a screen: "top_speed >= 3", "mass <= 30 and jump_height > 0.3".
+        conditions: expressions of metrics, parameters and values of actuators, as `where` of a
+            screen: "top_speed >= 3", "mass <= 30 and jump_height > 0.3". Those of learned metrics
+            hold where they do so in 95 % of what roll-outs leave open.
         vary: ranges of the numbers that may change, by name or as words; empty for all that the
             design states, each within the range of its parameter and at most doubled or halved.
         keep: numbers that stay as they are.
-        seed: seed of the designs that are drawn.
+        seed: seed of the designs that are drawn, and of the roll-outs.
+        replicas: roll-outs of each body at each speed and kick, for learned conditions; there are
+            about 120 bodies.
+        policy: see `draft.metrics.of_policy`.
+        progress: called with the bodies rolled out and their number, in each round.
 
     Raises:
         DraftError: the design is several, nothing may vary, a name is unknown or both kept and
-            varied, or a condition is no comparison of known names, needs a policy or a model, or is
-            undefined for the design.
+            varied, or a condition is no comparison of known names, needs a model, or is undefined
+            for the design; or a learned metric cannot be measured.
     """
     if design.count is not None:
         raise DraftError("a search starts from one design", "select one, such as `design[0]`")
     wanted = _conditions(design, conditions)
     axes = _axes(design, vary, keep)
-    search = _Search(design, wanted, axes, np.random.default_rng(seed))
-    return search.run()
+    rng = np.random.default_rng(seed)
+    if not any(by_rollouts(one) for one in wanted):
+        return Search(design, wanted, axes, rng).run()
+    from draft.explore.learned_solve import RolledOutSearch
+
+    settings = TargetSettings.of({"replicas": replicas, "policy": policy, "progress": progress})
+    return RolledOutSearch(design, wanted, axes, rng, settings, seed).run()
+
+
+def by_rollouts(condition: Constraint) -> bool:
+    """Whether a condition needs roll-outs."""
+    return any(name in LEARNED for name in condition.holds.metrics)
 
 
 def _conditions(design: Design, texts: Sequence[str]) -> tuple[Constraint, ...]:
@@ -153,12 +178,13 @@ def _conditions(design: Design, texts: Sequence[str]) -> tuple[Constraint, ...]:
         raise DraftError("there is no condition", 'such as "top_speed >= 3"')
     found = goals.constraints(design.spec, [*texts, "accepted"])
     for one in found:
-        if one.holds.needs_model:
-            cause = f"`{one.text}` needs a model or a policy"
-            raise DraftError(cause, "use closed-form metrics: 'draft metrics' lists them")
+        if any(find(name).needs == "model" for name in one.holds.metrics):
+            cause = f"`{one.text}` needs a compiled model"
+            remedy = "use closed-form or learned metrics: 'draft metrics' lists them"
+            raise DraftError(cause, remedy)
         if one.gap is None or one.text == "accepted":
             continue
-        needed = {name for side in one.gap for name in side.metrics}
+        needed = {name for side in one.gap for name in side.metrics if name not in LEARNED}
         values = of_design(design, needed)
         undefined = [name for name in needed if np.isnan(np.asarray(values[name])).any()]
         if undefined:
@@ -244,7 +270,7 @@ def _axes(design: Design, vary: Vary, keep: Sequence[str]) -> tuple[Axis, ...]:
     return tuple(axes)
 
 
-class _Search:
+class Search:
     """Search for the nearest design; numbers are shares of their ranges from the given ones."""
 
     def __init__(
@@ -261,7 +287,9 @@ class _Search:
             np.array([getattr(a, end) for a in axes]) for end in ("low", "high")
         )
         self._size = self._high - self._low
-        self._metrics = sorted({name for one in conditions for name in one.holds.metrics})
+        self._metrics = sorted(
+            {name for one in conditions for name in one.holds.metrics if name not in LEARNED}
+        )
         self.tried = 0
 
     def run(self) -> Solution:
@@ -339,13 +367,17 @@ class _Search:
         many = self._design.spec.resolve(self._design.values, self._values(drawn))
         with np.errstate(all="ignore"):
             found = of_design(many, self._metrics)
-            rows = [
-                np.where(many.accepted, 0.0, 1.0)
-                if one.text == "accepted"
-                else one.violation(many, found)
-                for one in chosen
-            ]
+            rows = [self._violation(one, drawn, many, found) for one in chosen]
         return np.stack([np.broadcast_to(row, len(drawn)) for row in rows], axis=1)
+
+    def _violation(
+        self, one: Constraint, drawn: Array, many: Design, found: Mapping[str, Value]
+    ) -> Array:
+        """Violation of a condition by designs, shape (designs,)."""
+        del drawn
+        if one.text == "accepted":
+            return np.where(many.accepted, 0.0, 1.0)
+        return one.violation(many, found)
 
     def _tidied(self, best: Array) -> Array:
         """The solution without changes that hardly matter, the others a little larger for it."""
@@ -386,7 +418,7 @@ class _Search:
         for row, i in enumerate(changed):
             without = self._resolved(rows[row])
             why = tuple(
-                self._reached(one, without)
+                self._reached(one, without, rows[row])
                 for one, fails in zip(self._conditions, failed[row], strict=True)
                 if fails and meets
             )
@@ -397,9 +429,9 @@ class _Search:
         design = self._resolved(best)
         violation = self._violations(best[None])[0]
         pairs = zip(self._conditions, violation, strict=True)
-        return tuple(self._reached(one, design) for one, miss in pairs if miss > 0)
+        return tuple(self._reached(one, design, best) for one, miss in pairs if miss > 0)
 
-    def _reached(self, one: Constraint, design: Design) -> str:
+    def _reached(self, one: Constraint, design: Design, drawn: Array) -> str:
         """A condition, with what a design reaches in its place."""
         if one.text == "accepted":
             errors = dict.fromkeys(f.id for f in design.findings if f.severity == "error")
@@ -407,10 +439,17 @@ class _Search:
         if one.gap is None:
             return one.text
         left = one.text.split("<")[0].split(">")[0].strip()
-        values = [scalar(side.value(design, of_design(design, side.metrics))) for side in one.gap]
+        values = [
+            scalar(side.value(design, self._measured(design, drawn, side.metrics)))
+            for side in one.gap
+        ]
         if one.gap[0].expression.text.strip() != left:
             values.reverse()
         return f"{one.text}, and it is {told_apart(values[1], values[0])[1]}"
+
+    def _measured(self, design: Design, drawn: Array, names: Sequence[str]) -> Mapping[str, Value]:
+        del drawn
+        return of_design(design, names)
 
     def _smallest(self) -> tuple[str, ...]:
         """A smallest set of conditions that exclude each other."""

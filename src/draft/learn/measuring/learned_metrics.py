@@ -8,7 +8,7 @@ the last third is measured: fast robots take four seconds to get up to speed.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
@@ -27,7 +27,7 @@ from draft.learn.measuring.evaluation_options import BodyRollOuts
 from draft.learn.measuring.heating import add_heat
 from draft.learn.measuring.levels import PUSH, SKILL_TESTS, SPEED, SkillTest
 from draft.learn.measuring.policies import Source
-from draft.learn.measuring.scalars import Worlds, curves, scalars
+from draft.learn.measuring.scalars import Worlds, curves, scalars, top_speed
 from draft.learn.measuring.utilisation import Histograms, utilisation
 from draft.metrics.capabilities import MEASURED
 from draft.values import Array
@@ -41,6 +41,7 @@ LEAD = 1.2  # No robot runs faster than this times its command; 1.1 was measured
 SETTLE = 2 / 3  # Share of a roll-out that is not measured.
 MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
 _LIMITS = {"sum": "torque and speed"}
+_ROUNDED = 1e-6  # Relative error of a level.
 _UPPER = 0.95  # Quantile at the upper end of a 90 % interval.
 
 
@@ -100,54 +101,13 @@ def measure(
         DraftError: the policy cannot be read or does not drive the bodies, or these have different
             topologies.
     """
-    from draft.learn.engine.machine import NATIVE, cores
-    from draft.learn.measuring.rollout.evaluate import evaluate
-    from draft.learn.measuring.rollout.trial import Trial
-    from draft.learn.training.ppo.worlds import task_of
-
-    check_family(members)
+    found = [
+        of_body(member, worlds, histograms, source.forward_for(member))
+        for member, worlds, histograms in roll_outs(
+            source, members, device, engine, rollouts, report
+        )
+    ]
     orders = [source.match(member).joints for member in members]
-    # Most bodies are fastest at one of the upper commands, and need not show what they do at the
-    # lower ones.
-    levels = speeds(source)
-    lower = replace(SKILL_TESTS[SPEED], levels=levels[: SPEEDS // 2])
-    upper = replace(SKILL_TESTS[SPEED], levels=levels[SPEEDS // 2 :])
-    first = (upper, replace(SKILL_TESTS[PUSH], levels=KICKS))
-    policy = source.actor(device)
-    threads = cores() if engine.name == NATIVE else 1
-
-    def rolled_out(
-        own: tuple[LeggedRobot, ...], chosen: tuple[SkillTest, ...], done: int
-    ) -> tuple[Worlds, Histograms]:
-        def advance(_: str, step: int, steps: int) -> None:
-            # A body has one roll-out, or two: the first counts as half of its time.
-            report(done + len(own) * step // (2 * steps), len(members))
-
-        task, count = replace(task_of(source.plan), members=own), rollouts.replicas * len(own)
-        seconds = rollouts.seconds
-        trial = Trial(task, chosen, count, seconds, SETTLE * seconds, seed=rollouts.seed)
-        return evaluate(trial, policy, device, advance, engine=engine.name, threads=threads)
-
-    block = max(1, MOST_WORLDS // (rollouts.replicas * sum(len(one.levels) for one in first)))
-    found: list[_One] = []
-    for start in range(0, len(members), block):
-        own = joined(members[start : start + block])
-        worlds, histograms = rolled_out(own, first, start)
-        measured = {
-            member.name: _one(member, worlds, histograms, source.forward_for(member))
-            for member in own
-        }
-        enough = LEAD * lower.levels[-1]
-        slow = tuple(one for one in own if not measured[one.name].numbers["top_speed"] > enough)
-        if slow:
-            more, counts = rolled_out(slow, (lower,), start + len(own) - len(slow) + len(slow) // 2)
-            worlds, histograms = worlds.with_rows(more), histograms.with_groups(counts)
-            measured |= {
-                member.name: _one(member, worlds, histograms, source.forward_for(member))
-                for member in slow
-            }
-        found += measured.values()
-        report(len(found), len(members))
     return Learned(
         **{name: np.array([one.numbers[name] for one in found]) for name in NUMBERS},
         limiting=tuple(one.limiting for one in found),
@@ -160,6 +120,93 @@ def measure(
             ]
         ),
     )
+
+
+def roll_outs(
+    source: Source,
+    members: Sequence[LeggedRobot],
+    device: str,
+    engine: Engine,
+    rollouts: BodyRollOuts,
+    report: Report = lambda done, of: None,
+    *,
+    tests: Sequence[str] = (SPEED, PUSH),
+    common: bool = False,
+) -> Iterator[tuple[LeggedRobot, Worlds, Histograms]]:
+    """Roll out bodies with a policy, in blocks.
+
+    Args:
+        source: the policy.
+        members: bodies of one topology.
+        device: "cpu" or "cuda:0" and the like.
+        engine: physics engine.
+        rollouts: numbers of the roll-outs.
+        report: called with the bodies done and their number, after every step.
+        tests: names of the skill tests.
+        common: see `Trial`; levels of speed that count for none of the bodies are omitted.
+
+    Yields:
+        Each body with a name of its own, and roll-outs with histograms that hold its own.
+
+    Raises:
+        DraftError: see `measure`.
+    """
+    from draft.learn.engine.machine import NATIVE, cores
+    from draft.learn.measuring.rollout.evaluate import evaluate
+    from draft.learn.measuring.rollout.trial import Trial
+    from draft.learn.training.ppo.worlds import task_of
+
+    check_family(members)
+    # Most bodies are fastest at one of the upper commands, and need not show what they do at the
+    # lower ones.
+    levels = speeds(source)
+    if common:
+        most = max(source.forward_for(member) for member in members) * (1 + _ROUNDED)
+        levels = tuple(level for level in levels if level <= most) or levels[:1]
+    below = min(SPEEDS // 2, len(levels) - 1)
+    lower = replace(SKILL_TESTS[SPEED], levels=levels[:below])
+    upper = replace(SKILL_TESTS[SPEED], levels=levels[below:])
+    first = tuple(
+        test for test in (upper, replace(SKILL_TESTS[PUSH], levels=KICKS)) if test.name in tests
+    )
+    policy = source.actor(device)
+    threads = cores() if engine.name == NATIVE else 1
+
+    def rolled_out(
+        own: tuple[LeggedRobot, ...], chosen: tuple[SkillTest, ...], done: int
+    ) -> tuple[Worlds, Histograms]:
+        def advance(_: str, step: int, steps: int) -> None:
+            # A body has one roll-out, or two: the first counts as half of its time.
+            report(done + len(own) * step // (2 * steps), len(members))
+
+        task, count = replace(task_of(source.plan), members=own), rollouts.replicas * len(own)
+        settle = SETTLE * rollouts.seconds
+        trial = Trial(
+            *(task, chosen, count, rollouts.seconds, settle), seed=rollouts.seed, common=common
+        )
+        return evaluate(trial, policy, device, advance, engine=engine.name, threads=threads)
+
+    block = max(1, MOST_WORLDS // (rollouts.replicas * sum(len(one.levels) for one in first)))
+    for start in range(0, len(members), block):
+        own = joined(members[start : start + block])
+        worlds, histograms = rolled_out(own, first, start)
+        slow: tuple[LeggedRobot, ...] = ()
+        if upper in first and lower.levels:
+            enough = LEAD * lower.levels[-1]
+            slow = tuple(one for one in own if not _fastest(source, one, worlds) > enough)
+        if slow:
+            more, counts = rolled_out(slow, (lower,), start + len(own) - len(slow) + len(slow) // 2)
+            worlds, histograms = worlds.with_rows(more), histograms.with_groups(counts)
+        for member in own:
+            yield member, worlds, histograms
+        report(start + len(own), len(members))
+
+
+def _fastest(source: Source, member: LeggedRobot, worlds: Worlds) -> float:
+    """Top speed of a body in roll-outs [m/s]; NaN for none."""
+    by_test = curves(worlds.of((worlds.member == member.name) & (worlds.test == SPEED)))
+    best = top_speed(by_test[SPEED], source.forward_for(member))
+    return math.nan if best is None else best[0]
 
 
 def of_designs(
@@ -192,7 +239,7 @@ def of_designs(
             or mjlab is missing.
     """
     count = design.count or 1
-    members, reasons = _walkers(source, design, rows)
+    members, reasons = walkers(source, design, rows)
     if not members:
         return _spread(None, members, count), reasons
     report(0, len(members))  # The libraries of the simulation take seconds to load.
@@ -201,7 +248,7 @@ def of_designs(
     return _spread(found, members, count), reasons
 
 
-def _walkers(
+def walkers(
     source: Source, design: Design, rows: NDArray[np.intp] | None
 ) -> tuple[dict[int, LeggedRobot], dict[int, str]]:
     """Accepted robots by row, and the reasons why others cannot walk with a policy.
@@ -245,23 +292,37 @@ def _spread(found: Learned | None, rows: Iterable[int], count: int) -> Learned:
 
 
 @dataclass(frozen=True)
-class _One:
+class OfBody:
+    """Capabilities of one body.
+
+    Attributes:
+        numbers: by name; NaN where the roll-outs give none.
+        limiting: see `Learned`.
+    """
+
     numbers: dict[str, float]
     limiting: str
 
 
-def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms, trained: float) -> _One:
-    """Capabilities of one body."""
+def of_body(member: LeggedRobot, worlds: Worlds, histograms: Histograms, trained: float) -> OfBody:
+    """Capabilities of one body.
+
+    Args:
+        member: the body.
+        worlds: roll-outs of the skill tests `speed` and `push`, or of one of them.
+        histograms: those of the same roll-outs.
+        trained: fastest command of the training [m/s].
+    """
     own = worlds.of(worlds.member == member.name)
     by_test = curves(own)
     add_energy(by_test, member)
     add_heat(by_test, histograms, member)
     values = scalars(by_test, member.leg_length, trained).values
-    level, error = values["peak_command"], math.nan
+    level, error = values.get("peak_command"), math.nan
     if level is not None:
         error = _error(own.of((own.test == SPEED) & ~own.fell).at(level).speed)
     limit = utilisation(histograms, by_test, values, member.name)["limiting"].get(SPEED)
-    return _One(
+    return OfBody(
         numbers={name: _number(values.get(name)) for name in MEASURED} | {"top_speed_error": error},
         limiting=f"{limit['joint']} {_LIMITS.get(limit['by'], limit['by'])}" if limit else "",
     )

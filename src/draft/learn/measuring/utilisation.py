@@ -53,6 +53,15 @@ class Histograms:
         joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
         return Histograms(**joined, classes=self.classes)
 
+    def of(self, rows: np.ndarray) -> Histograms:
+        """Select groups.
+
+        Args:
+            rows: their indices.
+        """
+        names = ("test", "level", "member", "counts", "plane")
+        return Histograms(**{n: getattr(self, n)[rows] for n in names}, classes=self.classes)
+
     def pooled(self, test: str, level: float, member: str | None = None) -> np.ndarray:
         """Sum the counts at a level, shape (classes, quantities, bins).
 

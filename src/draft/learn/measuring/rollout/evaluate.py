@@ -16,6 +16,7 @@ from tensordict import TensorDict
 from draft.errors import DraftError
 from draft.learn.engine.machine import WARP
 from draft.learn.measuring.levels import SkillTest
+from draft.learn.measuring.rollout.common_draws import CommonDraws
 from draft.learn.measuring.rollout.measure import Measures, each_step
 from draft.learn.measuring.rollout.trial import Trial, layout
 from draft.learn.measuring.rollout.trial_env import build
@@ -162,15 +163,18 @@ def _simulate(
 ) -> tuple[Worlds, Histograms]:
     names = ", ".join(test.name for test in tests)
     rows = layout(trial, tests)
+    shared = CommonDraws(rows.replica, trial.seed) if trial.common else contextlib.nullcontext()
     try:
-        env = make(trial, tests)
-        try:
-            actor = policy(env)
-            measures = roll_out(env, actor, trial, lambda _, step, of: report(names, step, of))
-            columns = measures.fetch()
-            samples = measures.samples(trial.each, len(trial.task.members))
-        finally:
-            env.close()
+        with shared:
+            env = make(trial, tests)
+            try:
+                actor = policy(env)
+                measures = roll_out(env, actor, trial, lambda _, step, of: report(names, step, of))
+                columns = measures.fetch()
+                each = 1 if trial.common else trial.each
+                samples = measures.samples(each, len(trial.task.members))
+            finally:
+                env.close()
     except (RuntimeError, MemoryError) as error:
         # PyTorch says "out of memory", Warp "failed to allocate".
         text = " ".join(str(error).split())[:200]
@@ -183,7 +187,7 @@ def _simulate(
         raise DraftError(cause, remedy) from None
     kept = {name: getattr(rows, name) for name in ("test", "level", "member", "replica", "kept")}
     # The first replica of each level and member gives the labels of its group.
-    first = rows.replica == 0
+    first = (rows.replica == 0) | trial.common
     groups = {name: getattr(rows, name)[first] for name in ("test", "level", "member")}
     classes = trial.task.members[0].classes
     counted = Histograms(**groups, counts=samples[0], plane=samples[1], classes=classes)

@@ -35,6 +35,8 @@ class Trial:
         published: whether some robots stand and some are commanded at least 0.3 m/s, as in the
             released code of the paper.
         seed: seed of everything random.
+        common: whether all designs and levels have the same random numbers, by replica, and
+            histograms are those of single roll-outs, in the order of the worlds.
         extra: events at the start, in addition to those of training, and before them.
     """
 
@@ -45,6 +47,7 @@ class Trial:
     settle: float
     published: bool = False
     seed: int = 0
+    common: bool = False
     extra: Mapping[str, EventTermCfg] = field(default_factory=dict)
 
     @property
