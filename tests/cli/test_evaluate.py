@@ -94,7 +94,7 @@ def test_a_design_is_evaluated_with_a_policy(command: Command) -> None:
         ("run --test ' , '", "--test [] is not names among walk"),
         ("run --test speed", "is for policies of stage velocity, and run is of stage"),
         # Each run takes the tests of its stage, and none is left.
-        ("run push --test walk", "'walk' is for policies of stage base, and push"),
+        ("run push --test walk", "'walk' is for policies of stage base, any, and push"),
         ("run push --test walk,push,speed", "'speed' is for policies of stage velocity"),
         ("run odd", "run and odd cannot be evaluated together: odd has another topology"),
         ("run a/run --out results", "named 'run'"),

@@ -13,7 +13,7 @@ from draft.cli import learn
 from draft.extras import remedy
 from draft.learn.engine import machine
 from draft.learn.engine.machine import Engine, Machine
-from draft.learn.task.config import STAGES, Config
+from draft.learn.task.config import Config
 from draft.learn.task.recipes import RECIPES, Change, Recipe
 from tests.commands import Command
 
@@ -134,7 +134,7 @@ def test_as_json_there_is_what_would_train_here(command: Command) -> None:
     expected = {"devices": ["cpu"], "engine": "native", "why": "the fastest without a GPU"}
     expected |= {"missing": None, "cores": 2, "processes": 2, "recipe": "laptop"}
     assert {name: told[name] for name in expected} == expected
-    assert told["ground"] == {stage: LAPTOP.ground(stage) for stage in STAGES}
+    assert told["ground"] == {stage: LAPTOP.ground(stage) for stage in LAPTOP.stages()}
     assert told["minutes"]["base"] == pytest.approx(200 * 512 * 24 / 4700 / 2 / 60)
     worlds = told["numbers"]["learning.environments"]
     assert (worlds["source"], worlds["doc"]) == ("choice: laptop", "number of worlds")

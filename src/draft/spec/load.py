@@ -67,7 +67,7 @@ def shipped() -> tuple[str, ...]:
     """Names of the robots that Draft and its extensions ship.
 
     >>> draft.shipped()
-    ('hopper', 'humanoid', 'quadruped')
+    ('biped', 'hexapod', 'hopper', 'humanoid', 'quadruped')
     """
     return tuple(sorted(FOLDERS))
 

@@ -53,6 +53,10 @@ class Recipe:
         """Ground of a stage: "uneven" or "flat"."""
         return "uneven" if STAGES[stage].uneven or not self.plane else "flat"
 
+    def stages(self) -> list[str]:
+        """Stages that it is for: `any` has a recipe of its own."""
+        return [name for name in STAGES if (name == "any") == (self.name == "any")]
+
     def source(self, name: str) -> str | None:
         """Source of a number that the recipe changes; None for other numbers."""
         return f"choice: {self.name}" if name in self.changes else None
