@@ -46,7 +46,7 @@ from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.measuring.scalars import Curve, curves, scalars
 from draft.learn.silence import quiet
 from draft.learn.task.recipes import LAPTOP, TUNE, RecipeName
-from draft.learn.training.ppo.trainer import task_of
+from draft.learn.training.ppo.worlds import task_of
 from draft.learn.training.run import Plan, Run
 from draft.values import scalar
 

@@ -47,7 +47,7 @@ from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.silence import quiet
 from draft.learn.task.recipes import LAPTOP
 from draft.learn.training.options import SliceOptions
-from draft.learn.training.ppo.trainer import task_of
+from draft.learn.training.ppo.worlds import task_of
 from draft.learn.training.progress import read
 from draft.learn.training.run import (
     PROGRESS,

@@ -26,6 +26,7 @@ import tyro
 
 from docs import pictures
 from draft.cli.display.capabilities import SHOWN, record
+from draft.errors import counted
 from draft.files import write
 from draft.learn.measuring.bands import FILE as BANDS
 from draft.learn.measuring.evaluation import setting
@@ -130,7 +131,9 @@ def _caused(found: RealRobot, policy: str | None) -> dict[str, dict[str, float]]
 def train_own(key: str, file: Path, folder: Path, seed: int, iterations: int) -> None:
     """Train and measure a policy of a robot's own with predicted masses, unless it is measured."""
     path = OWN / f"{key}.json"
-    known = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {"seeds": {}}
+    known: dict[str, Any] = {"seeds": {}}
+    if path.is_file():
+        known = json.loads(path.read_text(encoding="utf-8"))
     if str(seed) in known["seeds"]:
         return
     print(key, seed, file=sys.stderr)
@@ -310,7 +313,7 @@ def _own(found: Sequence[dict[str, Any]]) -> list[str]:
     seeds = max(len(row["seeds"]) for row in rows)
     lines = [
         f"Policies of their own: {rows[0]['iterations']} iterations each from the family's, with",
-        f"predicted masses; that of the family, then the least and the greatest of {seeds} seeds.",
+        f"predicted masses; that of the family, then of {counted(seeds, 'seed')} of its own.",
         "",
         "| robot | " + " | ".join(JUDGED.get(name, LABELS.get(name, "")) for name in OWNED) + " |",
         "| --- |" + " --- |" * len(OWNED),
@@ -321,7 +324,8 @@ def _own(found: Sequence[dict[str, Any]]) -> list[str]:
             of = [one[name] for one in row["seeds"].values() if name in one]
             known = family.get(row["robot"], {}).get(name, {}).get("value")
             before = "-" if known is None else brief(known)
-            cells.append(f"{before}; {brief(min(of))} to {brief(max(of))}" if of else before)
+            ends = " to ".join(dict.fromkeys((brief(min(of)), brief(max(of))))) if of else ""
+            cells.append(f"{before}; {ends}" if of else before)
         lines.append(f"| {row['robot']} | " + " | ".join(cells) + " |")
     return [*lines, ""]
 

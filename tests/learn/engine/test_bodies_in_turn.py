@@ -51,8 +51,9 @@ def first(tmp_path_factory: pytest.TempPathFactory, family: Plan) -> Trainer:
 
 
 def bodies(trainer: Trainer) -> Bodies:
-    assert trainer._bodies is not None
-    return trainer._bodies
+    (found,) = trainer._worlds._bodies
+    assert found is not None
+    return found
 
 
 @given(st.integers(1, 60), st.integers(1, 5), st.integers(0, 99))
@@ -125,7 +126,7 @@ def test_badly_tracked_cells_are_drawn_more_often(
 
 def test_a_family_of_no_more_bodies_than_worlds_keeps_them(family: Plan, tmp_path: Path) -> None:
     few = replace(family, members=family.members[: family.environments])
-    assert Trainer(begin(tmp_path / "run", few), "cpu", engine="native")._bodies is None
+    assert Trainer(begin(tmp_path / "run", few), "cpu", engine="native")._worlds._bodies == [None]
 
 
 def another() -> tuple[Plan, dict[str, str]]:

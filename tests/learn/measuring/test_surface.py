@@ -265,6 +265,6 @@ def test_the_cost_of_transport_is_electrical_power_per_weight_and_speed() -> Non
     row = {"member": one.name, "speed": 0.9, "mechanical": 120.0, "driving": 100.0, "copper": 50.0}
     samples = Histograms(nothing, nothing, nothing, np.zeros((0, 1, 3, 2)), nothing, one.classes)
     one = replace(one, electronics=(30.0,))
-    found = learned._one(one, worlds("speed", [row] * 4), samples, trained=1.0)
+    found = learned.of_body(one, worlds("speed", [row] * 4), samples, trained=1.0)
     assert found.numbers["cost_of_transport"] == pytest.approx(180.0 / (one.mass * 9.81 * 0.9))
     assert found.numbers["top_speed"] == pytest.approx(0.9)
