@@ -50,7 +50,7 @@ def test_closed_metrics_beside_learned_ones_are_what_they_are_alone(found: Sensi
     for field in ("base", "up", "step_up", "low", "high"):
         assert np.array_equal(getattr(found, field)[..., 1], getattr(alone, field)[..., 0])
     assert np.isnan(found.up[:, 0]).all()
-    assert found.base[1] == of_design(CHEETAH, ["mass"])["mass"]
+    assert found.base[1] == pytest.approx(of_design(CHEETAH, ["mass"])["mass"], rel=1e-12)
 
 
 def test_equal_seeds_give_equal_effects(found: Sensitivity) -> None:
@@ -60,8 +60,9 @@ def test_equal_seeds_give_equal_effects(found: Sensitivity) -> None:
 
 
 def test_the_interval_narrows_with_more_rollouts(found: Sensitivity) -> None:
-    few = effects(2, (TORQUE,))
-    assert found.high[0, 0] - found.low[0, 0] < 0.5 * (few.high[0, 0] - few.low[0, 0])
+    few = effects(2, found.names)
+    narrow, wide = (np.nanmedian(one.high[:, 0] - one.low[:, 0]) for one in (found, few))
+    assert narrow < 0.5 * wide
 
 
 def test_bodies_of_a_batch_have_the_same_draws_whatever_the_others_are() -> None:
@@ -95,7 +96,7 @@ def test_draws_are_those_of_the_replica() -> None:
 def test_a_solution_is_confirmed_by_another_evaluation() -> None:
     conditions = [f"{SPEED} >= 3.95", "mass <= 36"]
     vary = {TORQUE: (60.0, 110.0), "trunk_length": (0.4, 0.6)}
-    solved = draft.solve(CHEETAH, conditions, vary, replicas=4)
+    solved = draft.solve(CHEETAH, conditions, vary)
     assert solved.conflict is None
     assert solved.moved[0].name == TORQUE
     other = of_policy(solved.design, [SPEED], replicas=32, seed=7)

@@ -18,7 +18,7 @@ from draft.learn.bodies.legged import CLASSES, LeggedRobot, legged_robot
 from draft.learn.measuring.results import OCCUPANCY, UTILISATION
 from draft.learn.measuring.summary import FORMAT
 from draft.learn.measuring.utilisation import BINS, CELL, CELLS, WIDTH
-from draft.learn.task.config import STAGES
+from draft.learn.task.stages import PUBLISHED
 from draft.learn.training.members import robots_digest
 from draft.learn.training.run import Plan, Run, create
 from draft.model.folder import design_text
@@ -45,7 +45,7 @@ def study(
     designs: Sequence[str] = DESIGNS,
     seeds: Sequence[int] = (0, 1, 2),
     arms: Sequence[str] = ("nominal", "perturbed"),
-    stages: Iterable[str] = STAGES,
+    stages: Iterable[str] = tuple(stage.name for stage in PUBLISHED),
     protocols: Sequence[str] = ("walking",),
 ) -> Path:
     """Write a study of designs trained each for itself."""

@@ -194,6 +194,8 @@ class RolledOutSearch(Search):
 
     def _walking(self, drawn: Array) -> Array:
         """Designs that the policy drives, in its region if the given one is."""
+        if not len(drawn):
+            return drawn
         many = self._design.spec.resolve(self._design.values, self._values(drawn))
         members, _ = walkers(self._source, many, None)
         if not members:

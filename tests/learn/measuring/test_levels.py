@@ -114,7 +114,7 @@ def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
     (told,) = flags(skill_tests(["speed"]), plan(stage="velocity"), 1800)
     assert told == "speed: trained up to 15 m/s; beyond it: 17 to 20"
     told = flags(skill_tests(["walk"]), plan(stage="velocity"), 1800)
-    assert told == ["walk: for policies of stage base; this one is of stage velocity"]
+    assert told == ["walk: for policies of stage base, any; this one is of stage velocity"]
 
 
 def test_speeds_are_measured_once_robots_are_up_to_speed() -> None:

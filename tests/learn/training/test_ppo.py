@@ -184,7 +184,9 @@ def test_passes_take_the_samples_in_orders_of_their_own(monkeypatch: pytest.Monk
     collect(alg)
     batches: list[torch.Tensor] = []
     learn = alg._learn
-    monkeypatch.setattr(alg, "_learn", lambda *given: batches.append(given[2]) or learn(*given))
+    monkeypatch.setattr(
+        alg, "_learn", lambda *given, **more: batches.append(given[2]) or learn(*given, **more)
+    )
     alg.update()
     assert [len(batch) for batch in batches] == [WORLDS * STEPS // 3] * 6
     first, second = (torch.cat(batches[i : i + 3]) for i in (0, 3))
@@ -261,9 +263,9 @@ def test_statistics_stay_during_a_rollout_and_its_update(monkeypatch: pytest.Mon
     kls: list[float] = []
     learn = alg._learn
 
-    def spy(*given: torch.Tensor) -> torch.Tensor:
+    def spy(*given: torch.Tensor, **more: Any) -> torch.Tensor:
         assert all(map(np.array_equal, statistics(alg.actor), before))
-        found = learn(*given)
+        found = learn(*given, **more)
         kls.append(float(found[3]))
         return found
 

@@ -104,7 +104,7 @@ def test_values_of_a_critic_that_learns_alone_are_not_clipped(file: Path, tmp_pa
         old = values + 10.0  # Far from what it says now: clipping would bring it back near that.
         mean = alg.actor.mlp(own).detach()
         rest = (mean, old, zero, values, zero, mean, std)
-        found = float(alg._learn(own, seen, *rest)[0])
+        found = float(alg._learn(own, seen, *rest, present=None)[0])
         alg.critic.load_state_dict(state)
         return found
 
@@ -159,7 +159,9 @@ def test_a_policy_that_can_run_is_tuned_in_a_quarter_of_the_iterations(tmp_path:
     usual, tuned = prepared("laptop"), prepared("tune")
     own = LAPTOP.config.iterations
     assert 4 * SliceOptions().total(tuned.plan) == own("base") + own("velocity")
-    assert tuned.plan.config.velocity.missed > usual.plan.config.velocity.missed == 0
+    # Commands do not outgrow the body, and gaits keep the power that the family learnt to save.
+    assert tuned.plan.config.velocity.missed == usual.plan.config.velocity.missed > 0
+    assert tuned.plan.config.rewards.power_weight < usual.plan.config.rewards.power_weight == 0
     assert tuned.plan.ground == "flat"
     # A run that exists goes on without its policy being named again.
     options = TrainOptions(stage="velocity", recipe="tune", device="cpu")

@@ -177,9 +177,9 @@ def test_no_step_of_an_update_leaves_the_symmetric_networks(
     alg, steps, known = made.alg, [], matrix(flips(env)["actor"])
     learn = alg._learn
 
-    def spy(*given: torch.Tensor) -> torch.Tensor:
+    def spy(*given: torch.Tensor, **more: Any) -> torch.Tensor:
         before = alg.actor.mlp[0].weight.detach().clone()
-        found = learn(*given)
+        found = learn(*given, **more)
         weight = alg.actor.mlp[0].weight.detach()
         torch.testing.assert_close(swap(16) @ weight @ known.T, weight, atol=1e-7, rtol=1e-5)
         steps.append(float((weight - before).abs().max()))

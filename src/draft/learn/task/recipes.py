@@ -76,9 +76,9 @@ LAPTOP = Recipe(
         "learning.iterations_base": Change(
             250, "3.1 million steps: the giraffe needs most of them"
         ),
-        "learning.iterations_velocity": Change(400, "4.9 million steps: seeds come nearer"),
+        "learning.iterations_velocity": Change(250, "3.1 million steps"),
         "learning.iterations_terrain": Change(300, "3.7 million steps"),
-        "learning.iterations_push": Change(400, "4.9 million steps: seeds come nearer"),
+        "learning.iterations_push": Change(250, "3.1 million steps"),
         "rewards.action_rate_ramp": Change(100, "with the full weight it learns to stand still"),
         "episodes.joints": Change(0.1, "a symmetric policy needs an asymmetric start"),
         "episodes.contact_time": Change((0.01, 0.01), "a gait of softer feet fails on hard ground"),

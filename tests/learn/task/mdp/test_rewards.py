@@ -299,7 +299,7 @@ def test_a_reward_is_added_by_a_function_and_its_numbers(tmp_path: Path) -> None
         "learn/task/groups.py": {"\n\n@dataclass(frozen=True)\nclass Episodes": NUMBERS},
     }
     found = ChangedPackage(tmp_path, inserted).run("-c", PROGRAM)
-    stages = ["base", "velocity", "terrain", "push"]
+    stages = ["base", "velocity", "terrain", "push", "any"]
     assert found == {"stages": stages, "values": [0.25, 0.0]}
 
 

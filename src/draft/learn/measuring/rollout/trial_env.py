@@ -26,7 +26,7 @@ from draft.learn.engine.worlds.simulate import make
 from draft.learn.measuring.levels import KICKS, SkillTest
 from draft.learn.measuring.rollout.measure import EACH_STEP
 from draft.learn.measuring.rollout.trial import Layout, Trial, layout
-from draft.learn.task.groups import Ground
+from draft.learn.task.groups import Episodes, Ground
 from draft.learn.task.mdp import events
 from draft.learn.task.mdp.commands import command_term
 from draft.learn.task.mdp.environment import FALLS, environment
@@ -61,7 +61,11 @@ def build(
 def env_cfg(trial: Trial, tests: Sequence[SkillTest], rows: Layout) -> ManagerBasedRlEnvCfg:
     """Configuration of the environment, without rewards, curriculum, pushes and time-outs."""
     heights = _heights(tests)
-    task = replace(trial.task, seed=trial.seed, ground="uneven" if heights else "flat")
+    # What is measured is the design: motors as stated, whatever errors its training drew.
+    config = trial.task.config.with_values(_AS_STATED)
+    task = replace(
+        trial.task, seed=trial.seed, ground="uneven" if heights else "flat", config=config
+    )
     if heights:
         task = replace(
             task, config=task.config.with_values(_STAIRS | {"ground.rows": len(heights)})
@@ -80,6 +84,7 @@ def env_cfg(trial: Trial, tests: Sequence[SkillTest], rows: Layout) -> ManagerBa
     return cfg
 
 
+_AS_STATED = {f"episodes.{name}": getattr(Episodes(), name) for name in ("motor", "joint_friction")}
 # Both kinds of stairs and nothing else, with the same dimensions for all stages.
 _STAIRS = {
     f"{group}.{name}": share
