@@ -102,7 +102,7 @@ class SearchSettings(LearnedMetrics, Varied):
 class EffectSettings(SeeingPolicy):
     """Settings of learned metrics of bodies that are compared with each other."""
 
-    replicas: Annotated[int, Field(ge=2, le=1000), Shown("N")] = 12
+    replicas: Annotated[int, Field(ge=4, le=1000), Shown("N")] = 12
     """Roll-outs of each body at each speed and kick, for learned metrics."""
     progress: Annotated[Progress | None, Field(exclude=True)] = None
     """Called with the bodies rolled out and their number."""
@@ -111,6 +111,6 @@ class EffectSettings(SeeingPolicy):
 class TargetSettings(EffectSettings):
     """Settings of learned metrics in a search for the nearest design."""
 
-    replicas: Annotated[int, Field(ge=2, le=1000), Shown("N")] = 6
+    replicas: Annotated[int, Field(ge=4, le=1000), Shown("N")] = 6
     """Roll-outs of each body at each speed and kick, for learned metrics; a search has about 120
     bodies."""
