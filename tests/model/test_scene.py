@@ -43,7 +43,9 @@ def test_every_foot_touches_the_floor_in_the_home_pose(model: draft.Model) -> No
     scene = model.scene()
     data = _at_home(scene)
     feet = _feet(scene)
-    assert len(feet) == {"quadruped": 4, "humanoid": 2}.get(model.design.name, 1)
+    assert len(feet) == {"quadruped": 4, "humanoid": 2, "biped": 2, "hexapod": 6}.get(
+        model.design.name, 1
+    )
     for foot in feet:
         assert _lowest(scene, data, foot) == pytest.approx(0, abs=1e-6)
 

@@ -76,7 +76,7 @@ def show(
         group: [_sourced(row, chosen, given) for row in rows]
         for group, rows in config.rows(scale, stage).items()
     }
-    training = outlook(here, chosen, config, [stage] if stage else chosen.stages())
+    training = outlook(here, chosen, config, [stage] if stage else ())
     whys = {n: c.why for n, c in chosen.changes.items() if n not in given}
     if json:
         record = {"design": name, "scale": scale, "stage": stage}

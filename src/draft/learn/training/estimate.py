@@ -10,7 +10,6 @@ from draft.extras import remedy
 from draft.learn.engine.machine import KINDS, Machine, minutes, replicas
 from draft.learn.task.config import Config
 from draft.learn.task.recipes import Recipe
-from draft.learn.task.stages import STAGES
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ class Outlook:
 
 
 def outlook(
-    here: Machine, recipe: Recipe, config: Config | None = None, stages: Iterable[str] = STAGES
+    here: Machine, recipe: Recipe, config: Config | None = None, stages: Iterable[str] = ()
 ) -> Outlook:
     """Return the training of stages on a machine.
 
@@ -86,13 +85,16 @@ def outlook(
         here: the machine.
         recipe: the recipe, which decides the ground of each stage.
         config: numbers of the tasks; by default those of the recipe.
-        stages: stages to train.
+        stages: stages to train; empty for those of the recipe.
     """
     config = config or recipe.config
     worlds, processes = config.learning.environments, None
     if here.engine is not None:
         processes = replicas(None, worlds, here.engine, here.devices)
-    trainings = {stage: _training(stage, config, recipe, here, processes) for stage in stages}
+    trainings = {
+        stage: _training(stage, config, recipe, here, processes)
+        for stage in stages or recipe.stages()
+    }
     return Outlook(here, recipe.name, processes, trainings)
 
 
