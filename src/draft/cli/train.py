@@ -134,7 +134,7 @@ def _train(run: Run, options: TrainOptions, where: Setting, review: bool) -> int
         done = training.train_on(run, options, where, screen.tell)
     if not done:
         print(f"stopped: {kept()}")
-    elif review:
+    elif review and not run.plan.mixed:  # Tests of skills are of one topology.
         _conclude(run, where)
     else:
         print(all_done)

@@ -28,6 +28,7 @@ from draft.learn.training.ppo.legs_onnx import export_legs  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.worlds import Worlds  # noqa: E402
 from draft.learn.training.run import Plan, Run, open_run  # noqa: E402
+from tests.commands import Command  # noqa: E402
 from tests.learn.runs import begin, train, weights  # noqa: E402
 from tests.learn.small import SMALL  # noqa: E402
 
@@ -169,6 +170,21 @@ def test_a_file_that_is_no_such_policy_is_refused(
     file.write_bytes(change(legs.file.read_bytes()))
     with pytest.raises(DraftError, match=words):
         open_legs_policy(file)
+
+
+def test_the_command_trains_any_legs_and_refuses_what_is_of_one_robot(
+    command: Command, tmp_path: Path
+) -> None:
+    small = "--bodies 10 --envs 10 --iterations 1 --replicas 1 --set learning.steps=4"
+    said = command(f"train any {small} --out", tmp_path / "run").out
+    assert "1 of 1 iteration are done" in said
+    assert open_run(tmp_path / "run").plan.mixed
+    for words, message in (
+        ("--vary thigh_length=0.2:0.3", "its bodies are drawn already"),
+        ("--stage push", "has a stage of its own"),
+        ("--bodies 0", "bodies"),
+    ):
+        assert message in command.refuses(f"train any {words}")
 
 
 def test_a_run_of_one_topology_is_exported_otherwise(tmp_path: Path) -> None:
