@@ -17,7 +17,6 @@ from draft.explore.comparison_tables import section
 from draft.metrics import of_design
 from draft.studio.levers import Levers, between, effect_text, hold, to_target
 from draft.studio.library import Library
-from draft.studio.pinned_tab import comparison_card
 from draft.studio.report_page import report_page
 from draft.studio.session import Session
 from draft.values import scalar
@@ -67,6 +66,9 @@ def test_the_effects_of_sliders_need_no_verdict_and_are_those_of_the_command() -
 
 
 def test_the_card_of_a_pinned_design_has_the_numbers_of_the_comparison() -> None:
+    pytest.importorskip("viser")
+    from draft.studio.pinned_tab import comparison_card
+
     session = Session(Library(QUADRUPED))
     session.pin()
     pinned = session.shown
