@@ -91,6 +91,18 @@ def test_every_page_of_tasks_is_tested_and_has_its_picture() -> None:
         assert 2_000 < picture.stat().st_size < 150_000
 
 
+@pytest.mark.parametrize("robot", ["hexapod", "biped"])
+def test_a_robot_that_a_page_builds_is_the_one_that_ships(robot: str) -> None:
+    page = (DOCS / "howto" / f"{robot}.md").read_text(encoding="utf-8")
+    files = re.findall(rf"```yaml\n# {robot}/(\S+)\n(.*?)```", page, re.DOTALL)
+    assert {name for name, _ in files} == {"parameters.yaml", "tree.yaml", "root.yaml"}
+    for name, text in files:
+        shipped = (ROOT / "src/draft/robots" / robot / name).read_text(encoding="utf-8")
+        schema, own = shipped.split("\n", 1)
+        assert schema.startswith("# yaml-language-server: ")
+        assert own == text
+
+
 def test_commands_metrics_and_capabilities_are_all_on_their_pages() -> None:
     commands = generated_pages.commands()
     for command in COMMANDS:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,14 +28,13 @@ from draft.variation.axes import Range, ranges
 if TYPE_CHECKING:
     from draft.explore.rows import Rows
 
-Vary = Annotated[
-    tuple[str, ...],
-    tyro.conf.arg(
-        metavar="NAME=LOW:HIGH[:log] ...",
-        help="Ranges, or NAME=A,B,C: thigh_length=0.2:0.7 actuators.leg.peak_torque=40:500:log.",
-        help_behavior_hint="(required)",
-    ),
-]
+_varied = partial(
+    tyro.conf.arg,
+    metavar="NAME=LOW:HIGH[:log] ...",
+    help="Ranges, or NAME=A,B,C: thigh_length=0.2:0.7 actuators.leg.peak_torque=40:500:log.",
+)
+Vary = Annotated[tuple[str, ...], _varied(help_behavior_hint="(required)")]
+VaryToo = Annotated[tuple[str, ...], _varied(help_behavior_hint="(default: none)")]
 OfMetrics = Annotated[
     tuple[str, ...],
     tyro.conf.arg(

@@ -45,7 +45,7 @@ def main(
             help_behavior_hint="(default: all that the design states as numbers)",
         ),
     ] = (),
-    vary: x.Vary = (),
+    vary: x.VaryToo = (),
     screen: Annotated[
         Path | None,
         tyro.conf.arg(
