@@ -16,7 +16,8 @@ from draft.errors import DraftError
 from draft.learn.bodies.features import FEATURES, UNITS, features, readable
 from draft.learn.bodies.legged import REFERENCE_LEG, LeggedRobot, legged_robot
 from draft.learn.policy.policy import FAMILY, designs, open_policy, policy
-from draft.learn.policy.validity import Fit, Region, fit, train_command
+from draft.learn.policy.region import Region
+from draft.learn.policy.validity import Fit, fit, train_command
 from draft.learn.policy.walk import Walk
 from draft.model.model import preview
 from draft.values import scalar

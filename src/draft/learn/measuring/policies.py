@@ -14,7 +14,8 @@ from draft.errors import DraftError
 from draft.learn.bodies.features import family_features, features
 from draft.learn.policy.matching import Match, Structure, match, structure_of, trained_structure
 from draft.learn.policy.policy import CLIMBING_FAMILY, FAMILY, Policy, open_policy
-from draft.learn.policy.validity import FAMILY_NAME, Region, departures, sentence
+from draft.learn.policy.region import Region, departures, sentence
+from draft.learn.policy.validity import FAMILY_NAME
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
 from draft.learn.task.recipes import LAPTOP
