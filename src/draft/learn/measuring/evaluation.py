@@ -50,7 +50,7 @@ class Guest(Run):
 
         Args:
             reference: the design, as `draft.design.references.open_design` takes it.
-            policy: folder of a run or ONNX file; None for the policy that ships.
+            policy: folder of a run or ONNX file; None for the policy that ships for its legs.
 
         Raises:
             DraftError: there is none of either, or the policy does not drive the design.

@@ -62,7 +62,7 @@ def of_policy(
     Args:
         design: one design, or N.
         names: names of metrics in `LEARNED`; None for all.
-        policy: folder of a run or ONNX file; None for the policy of quadrupeds that ships.
+        policy: folder of a run or ONNX file; None for the policy that ships for its legs.
         known: digest that the policy has to have, see `digest`; "" for any.
         rows: which of N designs, increasing; None for all that the filter accepts.
         outside: whether designs outside the policy's region of validity have values too.

@@ -158,12 +158,6 @@ class Policy:
 def policy(design: str, skill: str = "walk") -> Policy:
     """Load the policy of a shipped design.
 
-        >>> walk = draft.policy("cheetah")
-        >>> walk
-        Policy('quadruped:cheetah', stage base, 48 observations, 12 actions)
-        >>> walk(np.zeros(48)).shape
-        (12,)
-
     Args:
         design: name of the design, such as "cheetah".
         skill: "walk", "run", "climb" or "push".
@@ -171,8 +165,7 @@ def policy(design: str, skill: str = "walk") -> Policy:
     Raises:
         DraftError: there is no such design or skill.
     """
-    if skill not in SKILLS:
-        raise DraftError(f"there is no skill '{skill}'", suggest(skill, SKILLS, "skills"))
+    check_skill(skill)
     name, shipped = short(design), designs()
     if name not in shipped:
         remedy = suggest(name, shipped, "designs with policies")
@@ -184,6 +177,16 @@ def policy(design: str, skill: str = "walk") -> Policy:
         cause = f"no policy of '{name}' that can {skill} is shipped"
         raise DraftError(cause, f"skills of {name}: {', '.join(known)}")
     return open_policy(file)
+
+
+def check_skill(skill: str) -> None:
+    """Check the name of a skill.
+
+    Raises:
+        DraftError: there is no such skill.
+    """
+    if skill not in SKILLS:
+        raise DraftError(f"there is no skill '{skill}'", suggest(skill, SKILLS, "skills"))
 
 
 def short(design: str) -> str:
