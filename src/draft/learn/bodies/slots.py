@@ -23,6 +23,7 @@ from draft.learn.bodies.features import GRAVITY, MASS
 from draft.learn.bodies.knees import knee_of
 from draft.learn.bodies.legged import REFERENCE_LEG, LeggedRobot
 from draft.learn.bodies.payload import model_spec
+from draft.model import pose
 from draft.values import Array
 
 # The joint above the knee whose axis is most parallel with the knee's lifts the leg.
@@ -171,9 +172,7 @@ class _Pose:
     def __init__(self, member: LeggedRobot, model: mujoco.MjModel | None = None) -> None:
         own: mujoco.MjModel = model or model_spec(member).compile()
         data = mujoco.MjData(own)
-        data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
-        data.qpos[7:] = member.home
-        mujoco.mj_kinematics(own, data)
+        pose.put(own, data, member.home)
         ids = [own.joint(name).id for name in member.joints]
         self.member, self.model = member, own
         self.axes, self.anchors = data.xaxis[ids].copy(), data.xanchor[ids].copy()
