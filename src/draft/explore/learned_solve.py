@@ -32,7 +32,7 @@ from draft.metrics import of_design
 from draft.values import Array, Value
 from draft.variation.axes import Axis
 
-_INSIDE = "learned.inside"
+_INSIDE, _TOP_SPEED = "learned.inside", "learned.top_speed"
 _PAIRS, _STEP = 12, 0.06  # Of the first batch: pairs of designs, and their change.
 _EACH, _ROUNDS = 10, 3  # Bodies of a round; rounds.
 _BASE = 16  # Roll-outs of the given design, over those of a first look.
@@ -148,9 +148,15 @@ class RolledOutSearch(Search):
         return self._solution(least, Conflict(together, self._misses(least)))
 
     def _solution(self, best: Array, conflict: Conflict | None) -> Solution:
-        notes = ()
+        notes = []
         if self._outside:
-            notes = (f"the learned metrics are of a design {self._outside}",)
+            notes.append(f"the learned metrics are of a design {self._outside}")
+        if any(_TOP_SPEED in one.holds.metrics for one in self._learned):
+            most = self._source.forward_for(legged_robot(self._design))
+            notes.append(
+                f"the policy was commanded up to {most:.2f} m/s at this size: "
+                "a top speed near that is a lower bound"
+            )
         return Solution(
             design=self._resolved(best) if best.any() else self._design,
             change=float(np.sqrt(np.mean(best**2))),
@@ -158,7 +164,7 @@ class RolledOutSearch(Search):
             conflict=conflict,
             tried=self.tried,
             rollouts=self._done,
-            notes=notes,
+            notes=tuple(notes),
         )
 
     def _spread(self, centre: Array) -> Array:
