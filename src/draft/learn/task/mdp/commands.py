@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
 # Share of the largest |vx| above which a command is fast; time after which speeds are compared
-# with it [s]; samples per world after which the largest |vx| may grow.
-_FAST, _LONG, _ENOUGH, _STEADY = 0.7, 1.5, 4, 4.0
+# with it, of a command and of an episode [s]; samples per world after which the largest |vx| may
+# grow.
+_FAST, _LONG, _STEADY, _ENOUGH = 0.7, 1.5, 4.0, 4
 
 
 class Growth(NamedTuple):
