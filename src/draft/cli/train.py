@@ -25,6 +25,7 @@ from draft.errors import counted, listed
 from draft.extras import check
 from draft.learn.silence import quiet
 from draft.learn.training.options import TrainOptions
+from draft.learn.training.progress import PROGRESS, gained
 from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:
@@ -138,6 +139,8 @@ def _train(run: Run, options: TrainOptions, where: Setting, review: bool) -> int
         _conclude(run, where)
     else:
         print(all_done)
+    if done and run.plan.origin and (gain := gained(run.folder / PROGRESS)):
+        print(gain)
     return 0
 
 

@@ -17,36 +17,27 @@ pytest.importorskip("mjlab")
 
 import draft  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.bodies.generated import generate, together  # noqa: E402
+from draft.learn.bodies.generated import generate  # noqa: E402
 from draft.learn.bodies.legged import by_topology, kind_of, legged_robot  # noqa: E402
 from draft.learn.bodies.slots import SLOTS, slots_of  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
-from draft.learn.task.recipes import ANY  # noqa: E402
 from draft.learn.task.world.access import robot_of  # noqa: E402
 from draft.learn.training.ppo.legs_onnx import export_legs  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.worlds import Worlds  # noqa: E402
-from draft.learn.training.run import Plan, Run, open_run  # noqa: E402
+from draft.learn.training.run import Run, open_run  # noqa: E402
 from tests.commands import Command  # noqa: E402
+from tests.learn.legs import mixed_plan  # noqa: E402
 from tests.learn.runs import begin, train, weights  # noqa: E402
-from tests.learn.small import SMALL  # noqa: E402
 
 if obstacle() is not None:
     pytest.skip("needs mjbatch", allow_module_level=True)
 
 
-def plan(**more: object) -> Plan:
-    """A plan with bodies of all kinds."""
-    members = together(generate(10)).members
-    config = ANY.config.with_values(SMALL)
-    numbers = {"environments": 10, "ground": "flat", "see_design": True, "see_ground": False}
-    return Plan(members, "any", config=config, **{**numbers, **more})
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    found = begin(tmp_path_factory.mktemp("mixture") / "run", plan())
+    found = begin(tmp_path_factory.mktemp("mixture") / "run", mixed_plan())
     train(found, 2, engine="native")
     return found
 
@@ -68,7 +59,7 @@ def test_a_run_keeps_robots_of_several_topologies(run: Run) -> None:
 
 
 def test_a_resumed_training_is_the_same_bit_by_bit(tmp_path: Path) -> None:
-    whole, parts = (begin(tmp_path / name, plan()) for name in ("whole", "parts"))
+    whole, parts = (begin(tmp_path / name, mixed_plan()) for name in ("whole", "parts"))
     first, second = train(whole, 4, engine="native"), train(parts, 1, 4, engine="native")
     for name, values in weights(first).items():
         assert torch.equal(values, weights(second)[name]), name
@@ -80,7 +71,7 @@ def test_actions_of_absent_joints_are_not_learnt(run: Run) -> None:
     absent = present.sum(0) == 0
     assert 0 < int(absent.sum()) < SLOTS
     last: Any = trainer.runner.alg.get_policy().mlp[-1]
-    first = Trainer(begin(run.folder.with_name("first"), plan()), "cpu", engine="native")
+    first = Trainer(begin(run.folder.with_name("first"), mixed_plan()), "cpu", engine="native")
     before: Any = first.runner.alg.get_policy().mlp[-1]
     assert torch.equal(last.weight[absent], before.weight[absent])
     assert not torch.equal(last.weight[~absent], before.weight[~absent])
@@ -190,7 +181,7 @@ def test_the_command_trains_any_legs_and_refuses_what_is_of_one_robot(
 def test_a_run_of_one_topology_is_exported_otherwise(tmp_path: Path) -> None:
     members = generate(10)[0].members
     single = begin(
-        tmp_path / "run", replace(plan(), members=members, stage="base", see_design=False)
+        tmp_path / "run", replace(mixed_plan(), members=members, stage="base", see_design=False)
     )
     with pytest.raises(DraftError, match="a run of one topology"):
         export_legs(single, tmp_path / "legs.onnx")

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import mujoco
@@ -23,10 +24,12 @@ from draft.learn.bodies.padding import places, size, starts, units
 from draft.learn.bodies.slots import FEATURES, SLOTS, Slots, describe
 from draft.learn.policy.matching import structure_of
 from draft.learn.policy.onnx_file import Network, of_layers, read
-from draft.learn.policy.policy import Policy
+from draft.learn.policy.policy import Policy, open_policy
 from draft.values import Array
 
 LAYOUT = "slots"  # Value of the metadata's key `layout` of such a policy.
+# Largest divisor of an observation that is constant in the training, with the epsilon of rsl-rl.
+_CONSTANT = 1.01e-2
 
 
 @dataclass(frozen=True, repr=False)
@@ -106,8 +109,16 @@ class LegsPolicy:
             features=np.zeros(0),
             known=np.zeros((2, 0)),
             leg_length=member.leg_length,
-            action_std=np.zeros(0),
+            action_std=self._noise(slots),
         )
+
+    def _noise(self, slots: Slots) -> Array:
+        """Standard deviation of a robot's actions, with the mean one for joints without a slot."""
+        if "action_std" not in self.network.metadata:
+            return np.zeros(0)
+        known = np.array(self.network.metadata["action_std"].split(","), float)
+        at = np.array(slots.joints)
+        return np.where(at >= 0, known[at], known[at[at >= 0]].mean())
 
     def _network(
         self, slots: Slots, length: float, features: Array, terms: Sequence[tuple[str, int]]
@@ -123,14 +134,23 @@ class LegsPolicy:
         fixed = np.setdiff1d(np.arange(len(mean)), moving)
         bias = bias + weight[:, fixed] @ ((values - mean) / divisor)[fixed]
         entry = np.maximum(own.entry, 0)
-        unit = own.sign * units("actor", length)[entry]
-        used = (own.entry >= 0) / own.share
+        unit = units("actor", length)[entry]
+        # Entries that no body of the training had have no say, but a training may go on from here.
+        driven = (own.entry >= 0) & (divisor[entry] > _CONSTANT)
+        used = driven * own.sign / own.share
+        middle, spread = np.where(driven, own.sign * mean[entry] / unit, 0.0), divisor[entry] / unit
+        start = 0
+        for _, count in terms:
+            term = slice(start, start := start + count)
+            spread[term][~driven[term]] = spread[term][driven[term]].mean()
+        at = starts("actor")["joint_pos"] + np.array(slots.joints)
+        moved = (np.array(slots.joints) >= 0) & (divisor[at] > _CONSTANT)
+        turned = np.array(slots.signs) * moved
         chosen = np.maximum(slots.joints, 0)
-        turned = np.array(slots.signs) * (np.array(slots.joints) >= 0)
         last, offset = layers[-1]
         return of_layers(
-            mean[entry] / unit,
-            divisor[entry] / unit,
+            middle,
+            spread,
             [
                 (weight[:, entry] * used, bias),
                 *layers[1:-1],
@@ -153,8 +173,10 @@ def open_legs_policy(path: str | Path) -> LegsPolicy:
     network = read(file)
     texts = network.metadata
     try:
-        if texts.get("layout") != LAYOUT:
+        if "layout" not in texts:
             raise ValueError("it drives the joints of one kind of robot")
+        if texts["layout"] != LAYOUT:
+            raise ValueError(f"its layout is '{texts['layout']}', and '{LAYOUT}' is known")
         low, high = (
             np.array(texts[f"features_{end}"].split(","), float) for end in ("low", "high")
         )
@@ -162,7 +184,8 @@ def open_legs_policy(path: str | Path) -> LegsPolicy:
             raise ValueError(f"it has {network.size} inputs, and {size('actor')} are known")
         if len(network.layers()[2][-1][1]) != SLOTS:
             raise ValueError(f"it has not {SLOTS} outputs")
-        if not all(np.isfinite(values).all() for values in (low, high)):
+        mean, divisor, layers = network.layers()
+        if not all(np.isfinite(x).all() for x in (low, high, mean, divisor, *chain(*layers))):
             raise ValueError("its numbers are not finite")
         pairs = (pair.split(";") for pair in texts["forward"].split(","))
         forward = {int(legs): float(speed) for legs, speed in pairs}
@@ -170,6 +193,26 @@ def open_legs_policy(path: str | Path) -> LegsPolicy:
         cause = f"{file} is no policy of all legs: {str(error).strip(chr(39))}"
         raise DraftError(cause, "use the one that ships, or one of 'draft train any'") from None
     return LegsPolicy(file, network, low, high, forward)
+
+
+def open_for(path: str | Path, members: Sequence[LeggedRobot]) -> Policy:
+    """Read a policy for the training of robots: one of all legs becomes that of its robot.
+
+    Args:
+        path: ONNX file.
+        members: the robots.
+
+    Raises:
+        DraftError: it cannot be read, or it is of all legs and there are several robots.
+    """
+    file = Path(path)
+    if "layout" not in read(file).metadata:
+        return open_policy(file)
+    legs = open_legs_policy(file)
+    if len(members) > 1:
+        cause = f"{file} becomes the policy of one robot, and this training has {len(members)}"
+        raise DraftError(cause, 'train one design, or start with `origin="scratch"`')
+    return legs.of_robot(members[0])
 
 
 def _ends(text: str) -> tuple[float, float]:

@@ -12,8 +12,9 @@ from draft.learn.engine.machine import NATIVE, cores
 from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SKILL_TESTS, SPEED
 from draft.learn.measuring.rollout.evaluate import Policy, evaluate, exported, trained
 from draft.learn.measuring.rollout.trial import Trial
-from draft.learn.policy.policy import open_policy
+from draft.learn.policy.reduced import open_for
 from draft.learn.task.constants import scaled
+from draft.learn.task.recipes import ANY
 from draft.learn.task.stages import is_like
 from draft.learn.training.ppo.worlds import task_of
 from draft.learn.training.progress import PROGRESS
@@ -29,6 +30,7 @@ REPLICAS, SECONDS, SETTLE = 64, 8.0, 2.0
 STEPS, KICKS = (0.05, 0.10), (1.0, 3.0)
 # Share of the commanded distance at which a robot that stays up has crossed the stairs.
 CROSSED = 0.6
+_WALKS = ("base", "velocity")  # Stages that teach what the policy of all legs can do.
 
 
 @dataclass(frozen=True)
@@ -90,8 +92,9 @@ def _origin(run: Run, device: str) -> Maker | None:
     if not file.is_file() or file_digest(file) != origin.digest:
         return None
     if origin.policy_file is not None:
-        known = open_policy(file)
-        same = known.stage == plan.stage and bool(len(known.scan_points)) == plan.see_ground
+        known = open_for(file, plan.members)
+        alike = known.stage == plan.stage or (known.stage == ANY.name and plan.stage in _WALKS)
+        same = alike and bool(len(known.scan_points)) == plan.see_ground
         return exported(known, device) if same else None
     first = open_run(source)
     same = first.plan.stage == plan.stage and first.plan.see_ground == plan.see_ground

@@ -68,7 +68,8 @@ def export_legs(run: Run, path: Path, iteration: int | None = None) -> None:
         helper.make_graph(nodes, "legs", seen, actions, tensors),
         opset_imports=[helper.make_opsetid("", 18)],
     )
-    helper.set_model_props(model, _metadata(run, number))
+    noise = {"action_std": _row(arrays["distribution.std_param"])}
+    helper.set_model_props(model, _metadata(run, number) | noise)
     onnx.checker.check_model(model)
     write(path, model.SerializeToString())
 
