@@ -158,7 +158,7 @@ class Setting:
         return self.devices == ("cpu",)
 
     def describe(self, run: Run, iterations: int) -> str:
-        """Engine, processes and expected minutes of training a run, in one line.
+        """Engine, processes, iterations and expected minutes of a training, in one line.
 
         Args:
             run: the run.
@@ -169,6 +169,9 @@ class Setting:
         kind = KINDS[self.engine.name]
         text = f"{kind} on {where} ({self.engine.why}), {counted(plan.environments, 'world')}"
         text += f" in {self.processes} processes" if self.processes > 1 else ""
+        joints = sorted(len(member.joints) for member in plan.members)
+        span = " to ".join(map(str, dict.fromkeys((joints[0], joints[-1]))))
+        text += f"; {counted(iterations, 'iteration')} for {span} joints"
         before = run.engine()
         if before not in (None, self.engine.name):
             text += f"; resumed from {before}: the same run, to single precision"
@@ -176,7 +179,8 @@ class Setting:
             return text
         steps = left * plan.environments * plan.config.learning.steps
         physics = plan.config.physics.decimation
-        time_left = machine.minutes(steps, physics, self.engine, self.processes, plan.ground)
+        mean = sum(joints) / len(joints)
+        time_left = machine.minutes(steps, physics, self.engine, self.processes, plan.ground, mean)
         slow = "" if self.engine.name == NATIVE else "; too slow for more than a trial"
         return f"{text}; about {time_left:.0f} min{slow}" if time_left >= 1 else f"{text}{slow}"
 
