@@ -17,14 +17,14 @@ SOURCE = Path(draft.__file__).parent
 BUDGET = {
     ".": 2_440,
     "assistant": 620,
-    "cli": 5_705,
+    "cli": 5_710,
     "description": 2_160,
     "design": 5_750,
     "explore": 4_700,
     "fitting": 3_710,
     "imports": 6_250,
     "laws": 1_910,
-    "learn": 18_770,
+    "learn": 19_240,
     "metrics": 1_910,
     "model": 3_900,
     "reporting": 1_820,
@@ -33,7 +33,7 @@ BUDGET = {
     "studio": 3_160,
     "study": 6_470,
     "twins": 1_590,
-    "validation": 980,
+    "validation": 985,
     "variation": 350,
 }
 

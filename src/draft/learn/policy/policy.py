@@ -25,9 +25,9 @@ DESIGN = "design"  # Term of the observation that holds the features of the desi
 FOLDER = Path(__file__).parents[2] / "robots" / ROBOT / "policies"
 # Policies of all quadrupeds of a range: one that is blind, and one that sees the ground.
 FAMILY, CLIMBING_FAMILY = FOLDER / "family.onnx", FOLDER / "family_climb.onnx"
-# Policy of all legs.
-ANY = Path(__file__).parents[2] / "robots" / "policies" / "any.onnx"
 FAMILIES = {"walk": FAMILY, "run": FAMILY, "push": FAMILY, "climb": CLIMBING_FAMILY}
+# The policy of all legs; see `draft.learn.policy.reduced`.
+ANY = FOLDER.parents[1] / "policies" / "any.onnx"
 Array = NDArray[np.float64]
 
 
@@ -206,7 +206,19 @@ def open_policy(path: str | Path) -> Policy:
         DraftError: it cannot be read, or was written by another tool.
     """
     file = Path(path)
-    network = read(file)
+    return with_network(file, read(file))
+
+
+def with_network(file: Path, network: Network) -> Policy:
+    """Return the policy of a network that `draft play` wrote.
+
+    Args:
+        file: file of the network.
+        network: the network, with its metadata.
+
+    Raises:
+        DraftError: the metadata are not those of a policy.
+    """
     try:
         return _policy(file, network)
     except (KeyError, ValueError) as error:
