@@ -21,6 +21,7 @@ from draft.learn.bodies.features import family_features, features  # noqa: E402
 from draft.learn.bodies.legged import legged_robot  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.measuring import learned_metrics as learned  # noqa: E402
+from draft.learn.measuring.drives import ByStructure  # noqa: E402
 from draft.learn.measuring.evaluation_options import BodyRollOuts  # noqa: E402
 from draft.learn.measuring.policies import _of_file, of_run, open_source  # noqa: E402
 from draft.learn.measuring.rollout.evaluate import evaluate  # noqa: E402
@@ -76,7 +77,9 @@ def test_every_design_of_the_grid_is_measured_or_refused_with_a_reason(found: Su
 
 
 def test_the_region_of_validity_is_that_of_the_features(run: Run) -> None:
-    region = of_run(run).drive.region
+    drive = of_run(run).drive
+    assert isinstance(drive, ByStructure)
+    region = drive.region
     assert region.holds(family_features(run.plan.members)).all()
     (far,) = open_bodies(["cheetah"], values={"thigh_length": 0.5}).members
     assert not region.holds(features(far)).all()
@@ -171,7 +174,9 @@ def test_the_plane_of_the_pages_is_accepted_and_within_the_policys_region() -> N
     numbers = [axis.ravel() for axis in grid]
     varied = {"thigh_length": numbers[0], "actuators.leg.peak_torque": numbers[1]}
     assert np.all(open_design("quadruped").spec.resolve(None, varied).accepted)
-    assert open_source(None).drive.region.holds(family_features(members)).all()
+    drive = open_source(None).drive
+    assert isinstance(drive, ByStructure)
+    assert drive.region.holds(family_features(members)).all()
 
 
 def test_the_error_of_a_mean_is_that_of_students_t() -> None:

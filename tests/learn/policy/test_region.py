@@ -206,7 +206,7 @@ def test_the_policy_of_all_legs_drives_robots_that_no_other_drives(robot: str) -
     found = fit(design.build())
     assert (found.name, found.outside) == (ANY_NAME, ())
     assert found.policy.joints == legged_robot(design).joints
-    weak = fit(preview(design.spec.resolve(design.values | WEAK[robot])))
+    weak = fit(preview(design.spec.resolve({**design.values, **WEAK[robot]})))
     assert weak.outside[0].name.startswith("peak torque of the ")
     assert weak.outside[0].unit == "N m"
     assert weak.outside[0].value < weak.outside[0].low
