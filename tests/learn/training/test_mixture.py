@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +26,7 @@ from draft.learn.bodies.legged import LeggedRobot, by_topology, kind_of, legged_
 from draft.learn.bodies.slots import SLOTS, describe, slots_of  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.engine.worlds.simulate import make  # noqa: E402
+from draft.learn.measuring.rollout import review  # noqa: E402
 from draft.learn.measuring.rollout.by_slots import by_slots  # noqa: E402
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
 from draft.learn.task.mdp.environment import environment  # noqa: E402
@@ -204,12 +206,18 @@ def test_a_file_that_is_no_such_policy_is_refused(
 
 
 def test_the_command_trains_any_legs_and_refuses_what_is_of_one_robot(
-    command: Command, tmp_path: Path
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(review, "SECONDS", 0.2)
+    monkeypatch.setattr(review, "SETTLE", 0.1)
     small = "--bodies 10 --envs 10 --iterations 1 --replicas 1 --set learning.steps=4"
     said = command(f"train any {small} --out", tmp_path / "run").out
-    assert "1 of 1 iteration are done" in said
-    assert open_run(tmp_path / "run").plan.mixed
+    opened = open_run(tmp_path / "run").plan
+    assert opened.mixed
+    for members in by_topology(opened.members):  # Of each, bodies at four speeds.
+        bodies = min(review.BODIES, len(members))
+        row = rf"{kind_of(members)} +{bodies}(?: +-?\d\.\d\d){{3}} +\d+ of {4 * bodies}\n"
+        assert re.search(row, said), kind_of(members)
     for words, message in (
         ("--vary thigh_length=0.2:0.3", "its bodies are drawn already"),
         ("--stage push", "has a stage of its own"),

@@ -152,12 +152,12 @@ def hardest_row(path: Path, iteration: int) -> float | None:
     return max(_column(path, STAIRS, iteration), default=None)
 
 
-def fastest(path: Path, iteration: float = math.inf) -> float | None:
+def fastest(path: Path, iteration: float = math.inf, column: str = FASTEST) -> float | None:
     """Largest |vx| that was commanded in an iteration [m/s]; None if none is recorded.
 
     Of a family, whose bodies are commanded as fast as they track, the mean over the worlds.
     """
-    return next(reversed(_column(path, FASTEST, iteration)), None)
+    return next(reversed(_column(path, column, iteration)), None)
 
 
 def gained(path: Path) -> str | None:

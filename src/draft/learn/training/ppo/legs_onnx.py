@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import onnx
@@ -14,7 +16,7 @@ from draft.files import write
 from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.legged import by_topology, kind_of
 from draft.learn.bodies.slots import ranges, slot_features
-from draft.learn.policy.reduced import LAYOUT
+from draft.learn.policy.reduced import LAYOUT, LegsPolicy, open_legs_policy
 from draft.learn.training.ppo.checkpoint import read_checkpoint
 from draft.learn.training.progress import FASTEST, PROGRESS
 from draft.learn.training.progress import read as read_progress
@@ -72,6 +74,22 @@ def export_legs(run: Run, path: Path, iteration: int | None = None) -> None:
     helper.set_model_props(model, _metadata(run, number) | noise)
     onnx.checker.check_model(model)
     write(path, model.SerializeToString())
+
+
+def legs_of(run: Run, iteration: int | None = None) -> LegsPolicy:
+    """Return the policy of a run of several topologies.
+
+    Args:
+        run: the run.
+        iteration: iterations of the checkpoint; None for the last.
+
+    Raises:
+        DraftError: as `export_legs`.
+    """
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "legs.onnx"
+        export_legs(run, file, iteration)
+        return replace(open_legs_policy(file), file=run.checkpoint(iteration)[1])
 
 
 def _metadata(run: Run, iteration: int) -> dict[str, str]:
