@@ -28,6 +28,8 @@ from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.engine.worlds.simulate import make  # noqa: E402
 from draft.learn.measuring.rollout import review  # noqa: E402
 from draft.learn.measuring.rollout.by_slots import by_slots  # noqa: E402
+from draft.learn.policy import video  # noqa: E402
+from draft.learn.policy.playback import Outcome, Playback  # noqa: E402
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
 from draft.learn.task.mdp.environment import environment  # noqa: E402
 from draft.learn.task.recipes import ANY  # noqa: E402
@@ -37,6 +39,7 @@ from draft.learn.training.ppo.legs_onnx import export_legs  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.worlds import Worlds  # noqa: E402
 from draft.learn.training.run import Run, open_run  # noqa: E402
+from draft.learn.watching.side_by_side import SideBySide  # noqa: E402
 from tests.commands import Command  # noqa: E402
 from tests.learn.legs import mixed_plan  # noqa: E402
 from tests.learn.runs import begin, train, weights  # noqa: E402
@@ -233,3 +236,55 @@ def test_a_run_of_one_topology_is_exported_otherwise(tmp_path: Path) -> None:
     )
     with pytest.raises(DraftError, match="a run of one topology"):
         export_legs(single, tmp_path / "legs.onnx")
+
+
+def test_robots_of_all_topologies_are_shown_side_by_side(run: Run) -> None:
+    shown = SideBySide(run)
+    assert shown.iteration == 2
+    assert [robot.member for robot in shown.robots] == [
+        members[0] for members in by_topology(run.plan.members)
+    ]
+    bodies = [shown.model.body(f"{i}/{one.member.trunk}").id for i, one in enumerate(shown.robots)]
+
+    def places() -> np.ndarray:
+        return shown.data.xpos[bodies].copy()
+
+    start = places()
+    assert (np.diff(start[:, 1]) < -0.3).all()  # From left to right.
+    assert start[:, 2] == pytest.approx([one.member.height for one in shown.robots], abs=1e-6)
+    shown.command = (9.0, 0.0, 0.5)
+    assert [one.command[0] for one in shown.robots] == [one.policy.forward for one in shown.robots]
+    for _ in range(20):
+        shown.step()
+    heights = [one.data.qpos[2] for one in shown.robots]
+    assert places()[:, 2] == pytest.approx(heights, abs=1e-6)
+    assert (places() != start).any()
+    first = shown.robots[0]
+    first.data.qpos[:7] = (0.3, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # It lies, and restarts there.
+    shown.step()
+    assert first.falls == 1
+    assert places()[0, 0] == pytest.approx(0.3, abs=0.05)
+    shown.load(2)
+    shown.reset()
+    assert places() == pytest.approx(start, abs=1e-6)
+
+
+def test_a_run_of_several_topologies_is_played(
+    command: Command, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = command("play", run.folder, "--onnx", tmp_path / "legs.onnx").out
+    assert f"{tmp_path / 'legs.onnx'}: the policy of all legs after 2 iterations" in said
+    assert open_legs_policy(tmp_path / "legs.onnx").of_robot(run.plan.members[0])
+    filmed = []
+
+    def film(player: Playback, *_: object) -> Outcome:
+        filmed.append(player)
+        return player.play(0.1)
+
+    monkeypatch.setattr(video, "film", film)
+    name = run.plan.members[-1].name
+    said = command("play", run.folder, "--member", name, "--out", tmp_path / "a.mp4").out
+    assert f"{name}, 2 iterations" in said
+    assert filmed[0].member.name == name
+    for words in ("--robots 2", "--ground uneven"):
+        assert "this one has several" in command.refuses("play", run.folder, *words.split())
