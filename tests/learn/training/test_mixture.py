@@ -260,7 +260,7 @@ def test_robots_of_all_topologies_are_shown_side_by_side(run: Run) -> None:
     assert places()[:, 2] == pytest.approx(heights, abs=1e-6)
     assert (places() != start).any()
     first = shown.robots[0]
-    first.data.qpos[:7] = (0.3, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # It lies, and restarts there.
+    first.data.qpos[:7] = (0.3, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0)  # Upside down, it restarts there.
     shown.step()
     assert first.falls == 1
     assert places()[0, 0] == pytest.approx(0.3, abs=0.05)
