@@ -88,6 +88,16 @@ def test_the_first_lines_tell_what_would_train_here(shown: Callable[..., str]) -
     assert out[1].endswith("base 3 iterations of 1 world on flat ground, less than 1 min")
 
 
+def test_more_joints_take_more_iterations_each_of_which_takes_longer(
+    shown: Callable[..., str],
+) -> None:
+    out = shown("humanoid", "--stage", "base")
+    assert out.splitlines()[1].endswith("751 iterations of 512 worlds on flat ground, about 40 min")
+    assert line_of(out, "learning.iterations_base").endswith("200 x (29 joints / 12)^1.5")
+    few = shown("humanoid", "--stage", "base", "--set", "learning.iterations_base=250")
+    assert "250 iterations of 512 worlds on flat ground, about 13 min" in few
+
+
 def test_numbers_of_a_recipe_tell_its_reasons(shown: Callable[..., str]) -> None:
     out = shown()
     assert out.count("\n") > len(Config().rows())

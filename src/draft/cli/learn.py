@@ -14,10 +14,10 @@ from draft.cli.display.verdict import console
 from draft.cli.options import DESIGN_FORMS, JsonOutput, parse_values
 from draft.cli.stage_choice import StageChoice
 from draft.design.references import open_designs
-from draft.learn.bodies.legged import legged_robot
+from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.engine.machine import this_machine
 from draft.learn.task.config import Config
-from draft.learn.task.constants import Row
+from draft.learn.task.constants import JOINTS, Row
 from draft.learn.task.recipes import RECIPES, Recipe, RecipeName, default
 from draft.learn.task.stages import STAGES
 from draft.learn.training.estimate import outlook
@@ -26,7 +26,7 @@ OptionalDesign = Annotated[
     tyro.conf.Positional[str | None],
     tyro.conf.arg(
         metavar="[DESIGN]",
-        help=f"Design at whose scale numbers are printed too: {DESIGN_FORMS}.",
+        help=f"Design at whose scale, and for whose joints, numbers are printed: {DESIGN_FORMS}.",
         help_behavior_hint="(default: none)",
     ),
 ]
@@ -70,13 +70,16 @@ def show(
     here = this_machine()
     chosen = RECIPES[recipe] if recipe else default(here.devices)
     given = parse_values(values)
+    robot = None if design is None else _robot(design)
+    name, scale = (None, 1.0) if robot is None else (robot.name, robot.scale)
+    joints = JOINTS if robot is None else len(robot.joints)
+    chosen = chosen.for_joints(joints)
     config = chosen.config.with_values(given)
-    name, scale = (None, 1.0) if design is None else _scale(design)
     groups = {
         group: [_sourced(row, chosen, given) for row in rows]
         for group, rows in config.rows(scale, stage).items()
     }
-    training = outlook(here, chosen, config, [stage] if stage else ())
+    training = outlook(here, chosen, config, [stage] if stage else (), joints)
     whys = {n: c.why for n, c in chosen.changes.items() if n not in given}
     if json:
         record = {"design": name, "scale": scale, "stage": stage}
@@ -103,11 +106,9 @@ def _sourced(row: Row, recipe: Recipe, given: Mapping[str, object]) -> Row:
     return row if source is None else row._replace(source=source)
 
 
-def _scale(reference: str) -> tuple[str, float]:
-    """Return name and scale of a design."""
+def _robot(reference: str) -> LeggedRobot:
     (design,) = open_designs([reference])
-    found = legged_robot(design)
-    return found.name, found.scale
+    return legged_robot(design)
 
 
 def _about(config: Config, group: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -148,6 +149,9 @@ def main(
     opened = open_run(Path(run))
     iteration, _ = opened.checkpoint(checkpoint)
     asked = make_output(opened.folder / "play.mp4", opened.folder / "policy.onnx")
+    if opened.plan.mixed:
+        _only_of_one_topology(ground=ground, robots=robots)
+        return _play_mixed(opened, iteration, member, settings, asked)
     chosen = devices(on.device)[0]
     stepped = choose(on.engine, [chosen])
     quiet()
@@ -236,6 +240,44 @@ def _exported(policy: Policy, design: Design, own: Sequence[str]) -> bytes:
         return of_policy(policy, member, legs.commands_for(member).tolist())
     cause = f"--onnx is for runs, for {_SPECIAL}, and for robots that the policy of any legs drives"
     raise DraftError(cause, "omit --onnx: this policy has the joints of another robot")
+
+
+def _play_mixed(run: Run, iteration: int, member: str | None, course: Course, asked: Output) -> int:
+    """Show a run of several topologies: one robot, or in the browser one of each topology."""
+    quiet()
+    need("mjlab", "learn")
+    print(spelt(run.policy_line(iteration)), flush=True)
+    from draft.learn.policy.playback import Playback, usual
+    from draft.learn.policy.playback_page import PlaybackPage
+    from draft.learn.training.ppo.legs_onnx import export_legs, legs_of
+    from draft.learn.watching.play import member_of
+    from draft.learn.watching.side_by_side import SideBySide, SideBySidePage
+
+    if asked.onnx is not None:
+        export_legs(run, asked.onnx, iteration)
+        _print_export(asked.onnx, "all legs", iteration)
+    if asked.web and member is None:
+        shown = SideBySide(run, iteration)
+        shown.command = course.command or shown.command
+        asked.serve(lambda *at: contextlib.closing(SideBySidePage(shown, run, *at)))
+    elif asked.web or asked.films:
+        chosen = member_of(run, member)
+        policy = legs_of(run, iteration).of_robot(chosen)
+        usually = usual(policy, run.plan.stage)
+        scenario = replace(usually, command=course.command or usually.command)
+        robot = Playback(policy, chosen, scenario)
+        if asked.web:
+            asked.serve(lambda *at: contextlib.closing(PlaybackPage(robot, *at)))
+        asked.film(robot, f"{chosen.name}, {counted(iteration, 'iteration')}")
+    return 0
+
+
+def _only_of_one_topology(**given: object) -> None:
+    """Refuse options that runs of several topologies lack: they are played in plain MuJoCo."""
+    for name, value in given.items():
+        if value not in (None, 1, "flat"):
+            cause = f"--{name} is for runs of one topology, and this one has several"
+            raise DraftError(cause, f"omit --{name}")
 
 
 def _only_for_runs(**given: object) -> None:

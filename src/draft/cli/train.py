@@ -25,6 +25,7 @@ from draft.errors import counted, listed
 from draft.extras import check
 from draft.learn.silence import quiet
 from draft.learn.training.options import TrainOptions
+from draft.learn.training.progress import PROGRESS, gained
 from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:
@@ -134,17 +135,22 @@ def _train(run: Run, options: TrainOptions, where: Setting, review: bool) -> int
         done = training.train_on(run, options, where, screen.tell)
     if not done:
         print(f"stopped: {kept()}")
-    elif review and not run.plan.mixed:  # Tests of skills are of one topology.
+    elif review:
         _conclude(run, where)
     else:
         print(all_done)
+    if done and run.plan.origin and (gain := gained(run.folder / PROGRESS)):
+        print(gain)
     return 0
 
 
 def _conclude(run: Run, where: Setting) -> None:
     """Test the policy, and print what it can do and how to see it."""
-    from draft.cli.display.training import conclude
-    from draft.learn.measuring.rollout.review import before, review
+    from draft.cli.display.training import conclude, conclude_mixed
+    from draft.learn.measuring.rollout.review import before, review, review_mixed
 
     device, engine = where.devices[0], where.engine.name
+    if run.plan.mixed:
+        conclude_mixed(run, review_mixed(run, device, engine))
+        return
     conclude(run, review(run, device, engine), before(run, device, engine))

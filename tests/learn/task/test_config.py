@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from draft.errors import DraftError
 from draft.learn.task.config import STAGES, Config, from_dict
 from draft.learn.task.constants import Scaled, scaled
-from draft.learn.task.recipes import RECIPES
+from draft.learn.task.recipes import ANY, LAPTOP, RECIPES, Recipe
 
 INFO = {
     f"{group}.{one.name}": one
@@ -176,3 +176,25 @@ def test_a_number_grows_with_its_power_of_the_scale() -> None:
     assert scaled(Config().rewards, "height") == Scaled(0.43, 1.0)
     with pytest.raises(KeyError):
         scaled(Config().rewards, "nothing")
+
+
+@pytest.mark.parametrize("recipe", RECIPES.values(), ids=lambda one: one.name)
+def test_iterations_follow_the_number_of_joints(recipe: Recipe) -> None:
+    for joints in (1, 8, 12):
+        assert recipe.for_joints(joints) is recipe
+    last = recipe
+    for joints in (13, 18, 29, 60):
+        more = recipe.for_joints(joints)
+        assert (more.name, more.plane) == (recipe.name, recipe.plane)
+        for stage in ("base", "velocity", "terrain", "push"):
+            usual, count = (one.config.iterations(stage) for one in (recipe, more))
+            assert count == pytest.approx(usual * (joints / 12) ** 1.5, abs=0.5)
+            assert count > last.config.iterations(stage)
+            assert (
+                f"{usual} x ({joints} joints / 12)"
+                in more.changes[f"learning.iterations_{stage}"].why
+            )
+        assert more.config.iterations("any") == recipe.config.iterations("any")
+        last = more
+    assert LAPTOP.for_joints(29).config.iterations("base") == 939
+    assert ANY.for_joints(10**6).config.iterations("base") == 10**7

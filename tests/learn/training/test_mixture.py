@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,12 +21,15 @@ from tensordict import TensorDict  # noqa: E402
 
 import draft  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.bodies.generated import generate, together  # noqa: E402
+from draft.learn.bodies.generated import generate  # noqa: E402
 from draft.learn.bodies.legged import LeggedRobot, by_topology, kind_of, legged_robot  # noqa: E402
 from draft.learn.bodies.slots import SLOTS, describe, slots_of  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.engine.worlds.simulate import make  # noqa: E402
+from draft.learn.measuring.rollout import review  # noqa: E402
 from draft.learn.measuring.rollout.by_slots import by_slots  # noqa: E402
+from draft.learn.policy import video  # noqa: E402
+from draft.learn.policy.playback import Outcome, Playback  # noqa: E402
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
 from draft.learn.task.mdp.environment import environment  # noqa: E402
 from draft.learn.task.recipes import ANY  # noqa: E402
@@ -34,8 +38,10 @@ from draft.learn.task.world.task import Task  # noqa: E402
 from draft.learn.training.ppo.legs_onnx import export_legs  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.worlds import Worlds  # noqa: E402
-from draft.learn.training.run import Plan, Run, open_run  # noqa: E402
+from draft.learn.training.run import Run, open_run  # noqa: E402
+from draft.learn.watching.side_by_side import SideBySide  # noqa: E402
 from tests.commands import Command  # noqa: E402
+from tests.learn.legs import mixed_plan  # noqa: E402
 from tests.learn.runs import begin, train, weights  # noqa: E402
 from tests.learn.small import SMALL  # noqa: E402
 
@@ -43,17 +49,9 @@ if obstacle() is not None:
     pytest.skip("needs mjbatch", allow_module_level=True)
 
 
-def plan(**more: object) -> Plan:
-    """A plan with bodies of all kinds."""
-    members = together(generate(10)).members
-    config = ANY.config.with_values(SMALL)
-    numbers = {"environments": 10, "ground": "flat", "see_design": True, "see_ground": False}
-    return Plan(members, "any", config=config, **{**numbers, **more})
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    found = begin(tmp_path_factory.mktemp("mixture") / "run", plan())
+    found = begin(tmp_path_factory.mktemp("mixture") / "run", mixed_plan())
     train(found, 2, engine="native")
     return found
 
@@ -75,7 +73,7 @@ def test_a_run_keeps_robots_of_several_topologies(run: Run) -> None:
 
 
 def test_a_resumed_training_is_the_same_bit_by_bit(tmp_path: Path) -> None:
-    whole, parts = (begin(tmp_path / name, plan()) for name in ("whole", "parts"))
+    whole, parts = (begin(tmp_path / name, mixed_plan()) for name in ("whole", "parts"))
     first, second = train(whole, 4, engine="native"), train(parts, 1, 4, engine="native")
     for name, values in weights(first).items():
         assert torch.equal(values, weights(second)[name]), name
@@ -87,7 +85,7 @@ def test_actions_of_absent_joints_are_not_learnt(run: Run) -> None:
     absent = present.sum(0) == 0
     assert 0 < int(absent.sum()) < SLOTS
     last: Any = trainer.runner.alg.get_policy().mlp[-1]
-    first = Trainer(begin(run.folder.with_name("first"), plan()), "cpu", engine="native")
+    first = Trainer(begin(run.folder.with_name("first"), mixed_plan()), "cpu", engine="native")
     before: Any = first.runner.alg.get_policy().mlp[-1]
     assert torch.equal(last.weight[absent], before.weight[absent])
     assert not torch.equal(last.weight[~absent], before.weight[~absent])
@@ -211,12 +209,18 @@ def test_a_file_that_is_no_such_policy_is_refused(
 
 
 def test_the_command_trains_any_legs_and_refuses_what_is_of_one_robot(
-    command: Command, tmp_path: Path
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(review, "SECONDS", 0.2)
+    monkeypatch.setattr(review, "SETTLE", 0.1)
     small = "--bodies 10 --envs 10 --iterations 1 --replicas 1 --set learning.steps=4"
     said = command(f"train any {small} --out", tmp_path / "run").out
-    assert "1 of 1 iteration are done" in said
-    assert open_run(tmp_path / "run").plan.mixed
+    opened = open_run(tmp_path / "run").plan
+    assert opened.mixed
+    for members in by_topology(opened.members):  # Of each, bodies at four speeds.
+        bodies = min(review.BODIES, len(members))
+        row = rf"{kind_of(members)} +{bodies}(?: +-?\d\.\d\d){{3}} +\d+ of {4 * bodies}\n"
+        assert re.search(row, said), kind_of(members)
     for words, message in (
         ("--vary thigh_length=0.2:0.3", "its bodies are drawn already"),
         ("--stage push", "has a stage of its own"),
@@ -228,7 +232,59 @@ def test_the_command_trains_any_legs_and_refuses_what_is_of_one_robot(
 def test_a_run_of_one_topology_is_exported_otherwise(tmp_path: Path) -> None:
     members = generate(10)[0].members
     single = begin(
-        tmp_path / "run", replace(plan(), members=members, stage="base", see_design=False)
+        tmp_path / "run", replace(mixed_plan(), members=members, stage="base", see_design=False)
     )
     with pytest.raises(DraftError, match="a run of one topology"):
         export_legs(single, tmp_path / "legs.onnx")
+
+
+def test_robots_of_all_topologies_are_shown_side_by_side(run: Run) -> None:
+    shown = SideBySide(run)
+    assert shown.iteration == 2
+    assert [robot.member for robot in shown.robots] == [
+        members[0] for members in by_topology(run.plan.members)
+    ]
+    bodies = [shown.model.body(f"{i}/{one.member.trunk}").id for i, one in enumerate(shown.robots)]
+
+    def places() -> np.ndarray:
+        return shown.data.xpos[bodies].copy()
+
+    start = places()
+    assert (np.diff(start[:, 1]) < -0.3).all()  # From left to right.
+    assert start[:, 2] == pytest.approx([one.member.height for one in shown.robots], abs=1e-6)
+    shown.command = (9.0, 0.0, 0.5)
+    assert [one.command[0] for one in shown.robots] == [one.policy.forward for one in shown.robots]
+    for _ in range(20):
+        shown.step()
+    heights = [one.data.qpos[2] for one in shown.robots]
+    assert places()[:, 2] == pytest.approx(heights, abs=1e-6)
+    assert (places() != start).any()
+    first = shown.robots[0]
+    first.data.qpos[:7] = (0.3, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0)  # Upside down, it restarts there.
+    shown.step()
+    assert first.falls == 1
+    assert places()[0, 0] == pytest.approx(0.3, abs=0.05)
+    shown.load(2)
+    shown.reset()
+    assert places() == pytest.approx(start, abs=1e-6)
+
+
+def test_a_run_of_several_topologies_is_played(
+    command: Command, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = command("play", run.folder, "--onnx", tmp_path / "legs.onnx").out
+    assert f"{tmp_path / 'legs.onnx'}: the policy of all legs after 2 iterations" in said
+    assert open_legs_policy(tmp_path / "legs.onnx").of_robot(run.plan.members[0])
+    filmed = []
+
+    def film(player: Playback, *_: object) -> Outcome:
+        filmed.append(player)
+        return player.play(0.1)
+
+    monkeypatch.setattr(video, "film", film)
+    name = run.plan.members[-1].name
+    said = command("play", run.folder, "--member", name, "--out", tmp_path / "a.mp4").out
+    assert f"{name}, 2 iterations" in said
+    assert filmed[0].member.name == name
+    for words in ("--robots 2", "--ground uneven"):
+        assert "this one has several" in command.refuses("play", run.folder, *words.split())

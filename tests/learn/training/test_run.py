@@ -6,6 +6,7 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from draft.errors import DraftError
 from draft.files import lock, locked
 from draft.learn.bodies.designs import open_bodies
 from draft.learn.training import run as runs
+from draft.learn.training.options import TrainOptions
 from draft.learn.training.run import (
     Origin,
     Plan,
@@ -25,6 +27,7 @@ from draft.learn.training.run import (
     upgrades,
     versions,
 )
+from draft.learn.training.train import prepare
 from draft.model.texts import Text
 from tests.learn.small import member, plan
 
@@ -183,6 +186,23 @@ def test_a_run_resumes_only_with_the_plan_that_created_it(tmp_path: Path) -> Non
         check_same(run, changed)
     with pytest.raises(DraftError, match="designs, robots differ"):
         check_same(run, replace(plan(), members=(member("bear"),)))
+
+
+def test_the_iterations_of_a_run_are_those_of_its_joints_unless_they_are_given(
+    tmp_path: Path,
+) -> None:
+    def total(design: str, **options: Any) -> int:
+        given = TrainOptions.of({"device": "cpu", **options})
+        run = prepare(design, tmp_path / f"{len(list(tmp_path.iterdir()))}", given)
+        number = json.loads((run.folder / "run.json").read_text())["config"]["learning"]
+        assert number["iterations_base"] == run.plan.config.iterations("base")
+        return given.total(run.plan)
+
+    assert total("cheetah") == total("biped") == 250
+    assert total("hexapod") == 459
+    assert total("humanoid") == 939
+    assert total("humanoid", iterations=7) == 7
+    assert total("humanoid", values={"learning.iterations_base": 300}) == 300
 
 
 def test_checkpoints_are_found_by_their_iteration(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from draft.learn.measuring.levels import ASCENT, PUSH, SPEED
 from draft.learn.training.progress import LinePrinter, clock, number, share, terms
 
 if TYPE_CHECKING:
-    from draft.learn.measuring.rollout.review import Level
+    from draft.learn.measuring.rollout.review import Kind, Level
     from draft.learn.training.progress import Progress
     from draft.learn.training.run import Run
 
@@ -93,6 +93,30 @@ def conclude(run: Run, found: Sequence[Level], before: Sequence[Level] = ()) -> 
     print(verdict(found, run.done()))
     if before and run.plan.origin and (text := worse(found, before)):
         print(f"it does worse than {run.plan.origin.run}, which it started from: {text}")
+    print(f"see it with: draft play {run.folder}")
+
+
+def conclude_mixed(run: Run, found: Sequence[Kind]) -> None:
+    """Print what a policy of several topologies can do with bodies of each, and how to see it.
+
+    Args:
+        run: the run.
+        found: its review.
+    """
+    print(f"after {run.seconds() / 60:.1f} min of training, {_steps(run)} steps:")
+    table = Table(box=None, pad_edge=False)
+    table.add_column("robots")
+    for heading in ("bodies", "asked [m/s]", "walks at [m/s]", "error [m/s]", "stay up"):
+        table.add_column(heading, justify="right")
+    for kind in found:
+        for i, one in enumerate(kind.levels):
+            table.add_row(
+                *((kind.name, str(kind.bodies)) if i == 0 else ("", "")),
+                f"{one.level:.2f}",
+                *(f"{x:.2f}" if math.isfinite(x) else "-" for x in (one.speed, one.error)),
+                f"{one.up} of {one.robots}",
+            )
+    console().print(table)
     print(f"see it with: draft play {run.folder}")
 
 

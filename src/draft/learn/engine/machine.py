@@ -20,6 +20,7 @@ from pydantic import Field
 
 from draft.errors import DraftError, counted
 from draft.extras import installed, need
+from draft.learn.task.constants import JOINTS
 
 EngineName = Annotated[
     Literal["auto", "native", "warp"],
@@ -273,7 +274,14 @@ def replicas(
     return requested
 
 
-def minutes(steps: float, physics: int, engine: Engine, processes: int, ground: str) -> float:
+def minutes(
+    steps: float,
+    physics: int,
+    engine: Engine,
+    processes: int,
+    ground: str,
+    joints: float = JOINTS,
+) -> float:
     """Estimate the time that training takes on a CPU [min].
 
     Args:
@@ -282,9 +290,11 @@ def minutes(steps: float, physics: int, engine: Engine, processes: int, ground: 
         engine: the physics engine.
         processes: number of processes that share the run, each on a core.
         ground: "flat" or "uneven".
+        joints: joints of the robots; steps take as much longer as they have more than twelve.
     """
     finer = (physics - _RATED_AT) * _PHYSICS[engine.name][ground]
-    return steps * (1.0 / _RATES[engine.name][ground] + finer) / processes / 60
+    step = (1.0 / _RATES[engine.name][ground] + finer) * max(1.0, joints / JOINTS)
+    return steps * step / processes / 60
 
 
 def check_memory(worlds: int, steps: int, observations: int, processes: int) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,7 @@ from draft.learn.bodies.legged_batch import legged_robots
 from draft.learn.measuring.drives import REMEDY, BySlots, ByStructure, Drive
 from draft.learn.policy.matching import match_of, structure_of, trained_structure
 from draft.learn.policy.policy import CLIMBING_FAMILY, FAMILY, Policy, open_policy
-from draft.learn.policy.reduced import LegsPolicy, any_legs, open_any, open_legs_policy
+from draft.learn.policy.reduced import LegsPolicy, any_legs, open_any
 from draft.learn.policy.region import Region, sentence
 from draft.learn.policy.validity import ANY_NAME, FAMILY_NAME
 from draft.learn.task.config import Config
@@ -148,7 +147,9 @@ def of_run(run: Run, blind: bool = False, robot: LeggedRobot | None = None) -> S
     """
     plan = run.plan
     if plan.mixed:
-        return _of_legs(_exported(run), str(run.folder), robot)
+        from draft.learn.training.ppo.legs_onnx import legs_of
+
+        return _of_legs(legs_of(run), str(run.folder), robot)
     iteration, file = run.checkpoint()
     if not plan.see_design and not blind:
         cause = f"the policy of {run.folder} does not see its design"
@@ -193,16 +194,6 @@ def _of_legs(policy: LegsPolicy, name: str, robot: LeggedRobot | None) -> Source
         cause = f"{name} is a policy of all legs, and what it can do depends on the robot"
         raise DraftError(cause, "name a robot")
     return _with_drive(policy.of_robot(robot), name, BySlots(policy, name))
-
-
-def _exported(run: Run) -> LegsPolicy:
-    """Last policy of a run of several topologies."""
-    from draft.learn.training.ppo.legs_onnx import export_legs
-
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "legs.onnx"
-        export_legs(run, file)
-        return replace(open_legs_policy(file), file=run.checkpoint()[1])
 
 
 def _with_drive(policy: Policy, name: str, drive: Drive) -> Source:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.design.references import find_design
-from draft.learn.bodies.legged import legged_robot
+from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.bodies.payload import model_spec
 from draft.learn.policy.controller import Controller
 from draft.learn.policy.play_options import Command, Course, PlaySettings
 from draft.learn.policy.policy import SKILLS, Policy, designs, short
@@ -86,20 +87,23 @@ class Playback:
         falls: number of falls so far.
     """
 
-    def __init__(self, policy: Policy, design: Design, scenario: Scenario, seed: int = 0) -> None:
+    def __init__(
+        self, policy: Policy, robot: Design | LeggedRobot, scenario: Scenario, seed: int = 0
+    ) -> None:
         """Put the robot into its scene.
 
         Args:
             policy: the policy, with the joints of the design; see `validity.fit`.
-            design: the robot.
+            robot: the robot: a design, or its numbers for training.
             scenario: command, ground and disturbances.
             seed: seed of kicks and of joint offsets at the start.
 
         Raises:
             DraftError: the policy does not fit the design.
         """
-        self.policy, self.member = policy, legged_robot(design)
-        self.model = _scene(design.build(), scenario.step)
+        self.policy = policy
+        self.member = legged_robot(robot) if isinstance(robot, Design) else robot
+        self.model = _scene(robot.build() if isinstance(robot, Design) else robot, scenario.step)
         self.data = mujoco.MjData(self.model)
         self.command, self.kick, self.falls = scenario.command, scenario.kick, 0
         self.controller = Controller(policy, self.model)
@@ -107,6 +111,11 @@ class Playback:
         self._feet = [self.model.site(name).id for name in self.member.feet]
         self._trunk = self.model.body(self.member.trunk).id
         self.reset()
+
+    @property
+    def title(self) -> str:
+        """Name of the robot."""
+        return self.member.name
 
     @property
     def period(self) -> float:
@@ -128,6 +137,9 @@ class Playback:
     def reset(self) -> None:
         """Put the robot back to the start."""
         self.controller.reset(self.data, int(self._random.integers(2**31)))
+        if not self.model.nkey:
+            self.data.qpos[2] = self.member.height
+            mujoco.mj_forward(self.model, self.data)
 
     def step(self) -> None:
         """Advance by one physics step; a robot that falls restarts.
@@ -184,11 +196,15 @@ class Playback:
         return bool(low or up < np.cos(_EPISODES.tilt))
 
 
-def _scene(model: Model, step: float) -> mujoco.MjModel:
+def _scene(robot: Model | LeggedRobot, step: float) -> mujoco.MjModel:
     """The robot on a plane, or before a flight of steps up and one down."""
-    spec = mujoco.MjSpec.from_string(model.scene_xml, include={"robot.xml": model.xml.encode()})
-    spec.delete(spec.geom("floor"))
-    spec.delete(spec.texture("sky"))
+    if isinstance(robot, LeggedRobot):
+        spec = model_spec(robot)
+    else:
+        own = {"robot.xml": robot.xml.encode()}
+        spec = mujoco.MjSpec.from_string(robot.scene_xml, include=own)
+        spec.delete(spec.geom("floor"))
+        spec.delete(spec.texture("sky"))
     ground = spec.worldbody.add_body(name="terrain")
     ground.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 0.05))
     for start, length, height in _flight(step) if step else ():

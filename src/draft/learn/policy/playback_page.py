@@ -2,11 +2,61 @@
 
 from __future__ import annotations
 
-from draft.learn.policy.playback import Playback
+from typing import TYPE_CHECKING, Protocol
+
+from draft.learn.policy.play_options import Command
+from draft.learn.policy.policy import Policy
 from draft.serving.gamepad import Gamepad, Sticks
 from draft.serving.server import Server
 
+if TYPE_CHECKING:
+    import mujoco
+
 _SIDEWAYS, _TURN = 0.6, 1.0  # Ends of the sliders: share of the forward one; [rad/s].
+
+
+class Steered(Protocol):
+    """What a page shows and steers; see `Playback`."""
+
+    @property
+    def command(self) -> Command:
+        """Commanded vx, vy [m/s], wz [rad/s]."""
+        ...
+
+    @command.setter
+    def command(self, command: Command, /) -> None: ...
+
+    @property
+    def title(self) -> str:
+        """What is shown, in words."""
+        ...
+
+    @property
+    def policy(self) -> Policy:
+        """Policy, for the fastest command."""
+        ...
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """Model to show."""
+        ...
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """State of the model."""
+        ...
+
+    def step(self) -> None:
+        """Advance by one physics step."""
+        ...
+
+    def reset(self) -> None:
+        """Go back to the start."""
+        ...
+
+    def push(self, size: float, /) -> None:
+        """Add a velocity of at most this size [m/s]."""
+        ...
 
 
 class PlaybackPage:
@@ -16,7 +66,7 @@ class PlaybackPage:
         port: port of the server.
     """
 
-    def __init__(self, playback: Playback, host: str, port: int, token: str | None) -> None:
+    def __init__(self, playback: Steered, host: str, port: int, token: str | None) -> None:
         """Start serving.
 
         Args:
@@ -56,7 +106,7 @@ class PlaybackPage:
         gui, playback = self._server.viser.gui, self._playback
         most = playback.policy.forward
         sides = min(_SIDEWAYS * most, _SIDEWAYS)
-        with gui.add_folder(f"{playback.member.name}: steer"):
+        with gui.add_folder(f"{playback.title}: steer"):
             self._sliders = sliders = [
                 gui.add_slider(label, -end, end, step=0.05, initial_value=value)
                 for label, end, value in zip(

@@ -40,6 +40,8 @@ from draft.values import Array
 _REMEDY = "use the one that ships, or one of 'draft train any'"
 _NARROW = 0.1  # Width of a range of features below which it counts as this wide.
 LAYOUT = "slots"  # Value of the metadata's key `layout` of such a policy.
+# Largest divisor of an observation that is constant in the training, with the epsilon of rsl-rl.
+_CONSTANT = 1.01e-2
 
 
 @dataclass(frozen=True, repr=False)
@@ -152,8 +154,16 @@ class LegsPolicy:
             features=np.zeros(0),
             known=np.zeros((2, 0)),
             leg_length=member.leg_length,
-            action_std=np.zeros(0),
+            action_std=self._noise(slots),
         )
+
+    def _noise(self, slots: Slots) -> Array:
+        """Standard deviation of a robot's actions, with the mean one for joints without a slot."""
+        if "action_std" not in self.network.metadata:
+            return np.zeros(0)
+        known = np.array(self.network.metadata["action_std"].split(","), float)
+        at = np.array(slots.joints)
+        return np.where(at >= 0, known[at], known[at[at >= 0]].mean())
 
     def _network(
         self, slots: Slots, length: float, features: Array, terms: Sequence[tuple[str, int]]
@@ -169,14 +179,21 @@ class LegsPolicy:
         fixed = np.setdiff1d(np.arange(len(mean)), moving)
         bias = bias + weight[:, fixed] @ ((values - mean) / divisor)[fixed]
         entry = np.maximum(own.entry, 0)
-        unit = own.sign * units("actor", length)[entry]
-        used = (own.entry >= 0) / own.share
+        unit = units("actor", length)[entry]
+        driven = (own.entry >= 0) & np.isfinite(divisor[entry])
+        used = driven * own.sign / own.share
+        # Observations of other joints have no say, but a training may go on from here.
+        middle, spread = np.where(driven, own.sign * mean[entry] / unit, 0.0), divisor[entry] / unit
+        start = 0
+        for _, count in terms:
+            term = slice(start, start := start + count)
+            spread[term][~driven[term]] = spread[term][driven[term]].mean()
         chosen = np.maximum(slots.joints, 0)
         turned = np.array(slots.signs) * (np.array(slots.joints) >= 0)
         last, offset = layers[-1]
         return of_layers(
-            mean[entry] / unit,
-            divisor[entry] / unit,
+            middle,
+            spread,
             [
                 (weight[:, entry] * used, bias),
                 *layers[1:-1],
@@ -206,7 +223,7 @@ def open_any(path: str | Path) -> AnyPolicy:
     """
     file = Path(path)
     network = read(file)
-    if network.metadata.get("layout") == LAYOUT:
+    if "layout" in network.metadata:
         return _legs(file, network)
     return with_network(file, network)
 
@@ -230,6 +247,8 @@ def open_legs_policy(path: str | Path) -> LegsPolicy:
 def _legs(file: Path, network: Network) -> LegsPolicy:
     texts = network.metadata
     try:
+        if texts["layout"] != LAYOUT:
+            raise ValueError(f"its layout is '{texts['layout']}', and '{LAYOUT}' is known")
         rows = (row.split(";") for row in texts["commands"].split(","))
         commands = {int(legs): (float(x), float(y), float(z)) for legs, x, y, z in rows}
         known = {
@@ -248,7 +267,37 @@ def _legs(file: Path, network: Network) -> LegsPolicy:
     except (KeyError, ValueError) as error:
         cause = f"{file} is no policy of all legs: {str(error).strip(chr(39))}"
         raise DraftError(cause, _REMEDY) from None
-    return LegsPolicy(file, network, known, commands)
+    return LegsPolicy(file, _without_constants(network), known, commands)
+
+
+def _without_constants(network: Network) -> Network:
+    """A network in which joints that no body of its training had have no say, and hold still."""
+    mean, divisor, layers = network.layers()
+    constant, first = divisor <= _CONSTANT, starts("actor")["joint_pos"]
+    still = constant[first : first + SLOTS]
+    *others, (weight, bias) = layers
+    last = np.where(still[:, None], 0.0, weight), np.where(still, 0.0, bias)
+    divisor = np.where(constant, np.inf, divisor)
+    return of_layers(mean, divisor, [*others, last], network.metadata)
+
+
+def open_for(path: str | Path, members: Sequence[LeggedRobot]) -> Policy:
+    """Read a policy for the training of robots: one of all legs becomes that of its robot.
+
+    Args:
+        path: ONNX file.
+        members: the robots.
+
+    Raises:
+        DraftError: it cannot be read, or it is of all legs and there are several robots.
+    """
+    found = open_any(path)
+    if isinstance(found, Policy):
+        return found
+    if len(members) > 1:
+        cause = f"{path} becomes the policy of one robot, and this training has {len(members)}"
+        raise DraftError(cause, 'train one design, or start with `origin="scratch"`')
+    return found.of_robot(members[0])
 
 
 def _ends(text: str) -> tuple[float, float]:

@@ -54,6 +54,7 @@ ANY = Within("a number", lambda _: True)
 LEAST_ZERO = Within("0 or more", lambda values: min(values) >= 0)
 POSITIVE = Within("above 0", lambda values: min(values) > 0)
 MOST_ITERATIONS = 10**7
+JOINTS = 12  # Of the robots that the numbers of tasks and recipes are for.
 ITERATIONS = Within(
     f"from 1 to {MOST_ITERATIONS}",
     lambda values: 1 <= min(values) <= max(values) <= MOST_ITERATIONS,

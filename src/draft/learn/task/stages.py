@@ -15,7 +15,7 @@ from pydantic import BeforeValidator
 from pydantic_core import PydanticKnownError
 
 from draft.extensions import Registry
-from draft.learn.task.constants import Scaled, scaled
+from draft.learn.task.constants import JOINTS, Scaled, scaled
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnvCfg
@@ -135,7 +135,7 @@ def any_legs(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
 
     numbers, v, member = task.config.rewards, task.config.velocity, task.members[0]
     command, terms = _command(cfg), cfg.rewards
-    share = _JOINTS / len(member.joints)
+    share = JOINTS / len(member.joints)
     terms["action_rate"].params["ramp"] = numbers.action_rate_ramp
     for name in ("action_rate", "joint_limits"):
         terms[name].weight *= share
@@ -212,7 +212,6 @@ def _slow(task: Task) -> tuple[Scaled, Scaled, Scaled]:
 
 
 # Stages of the paper, which a study trains unless its file names others.
-_JOINTS = 12  # Of the robots that the weights of the rewards are for.
 _ON_TWO_LEGS = 0.2, 0.5  # Shares of the speeds ahead and to the side in stage `any`.
 PUBLISHED = (
     Stage("base", base, origin=None),

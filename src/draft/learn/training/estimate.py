@@ -9,6 +9,7 @@ from draft.errors import counted
 from draft.extras import remedy
 from draft.learn.engine.machine import KINDS, Machine, minutes, replicas
 from draft.learn.task.config import Config
+from draft.learn.task.constants import JOINTS
 from draft.learn.task.recipes import Recipe
 
 
@@ -77,7 +78,11 @@ class Outlook:
 
 
 def outlook(
-    here: Machine, recipe: Recipe, config: Config | None = None, stages: Iterable[str] = ()
+    here: Machine,
+    recipe: Recipe,
+    config: Config | None = None,
+    stages: Iterable[str] = (),
+    joints: int = JOINTS,
 ) -> Outlook:
     """Return the training of stages on a machine.
 
@@ -86,26 +91,27 @@ def outlook(
         recipe: the recipe, which decides the ground of each stage.
         config: numbers of the tasks; by default those of the recipe.
         stages: stages to train; empty for those of the recipe.
+        joints: joints of the robot.
     """
     config = config or recipe.config
     worlds, processes = config.learning.environments, None
     if here.engine is not None:
         processes = replicas(None, worlds, here.engine, here.devices)
     trainings = {
-        stage: _training(stage, config, recipe, here, processes)
+        stage: _training(stage, config, recipe, here, processes, joints)
         for stage in stages or recipe.stages()
     }
     return Outlook(here, recipe.name, processes, trainings)
 
 
 def _training(
-    stage: str, config: Config, recipe: Recipe, here: Machine, processes: int | None
+    stage: str, config: Config, recipe: Recipe, here: Machine, processes: int | None, joints: int
 ) -> Training:
     learning, ground = config.learning, recipe.ground(stage)
     count, took = config.iterations(stage), None
     if here.on_cpu and here.engine is not None and processes is not None:
         steps = count * learning.environments * learning.steps
-        took = minutes(steps, config.physics.decimation, here.engine, processes, ground)
+        took = minutes(steps, config.physics.decimation, here.engine, processes, ground, joints)
     return Training(count, learning.environments, ground, took)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from draft.errors import counted
 from draft.learn.engine.rows import BODIES_ERROR, BODIES_WORST, Row
 
 PROGRESS = "progress.csv"  # Name of its file.
@@ -22,6 +23,7 @@ CURVE_COLUMNS = (
     *(BODIES_ERROR, BODIES_WORST),
 )
 WINDOWS = 50
+_GAINED = 10  # Most iterations at either end that a gain is measured over.
 LINE_SECONDS = 5.0  # Least time between two lines.
 
 
@@ -150,12 +152,32 @@ def hardest_row(path: Path, iteration: int) -> float | None:
     return max(_column(path, STAIRS, iteration), default=None)
 
 
-def fastest(path: Path, iteration: float = math.inf) -> float | None:
+def fastest(path: Path, iteration: float = math.inf, column: str = FASTEST) -> float | None:
     """Largest |vx| that was commanded in an iteration [m/s]; None if none is recorded.
 
     Of a family, whose bodies are commanded as fast as they track, the mean over the worlds.
     """
-    return next(reversed(_column(path, FASTEST, iteration)), None)
+    return next(reversed(_column(path, column, iteration)), None)
+
+
+def gained(path: Path) -> str | None:
+    """What a training that started from a policy gained, in words; None if it is too short.
+
+    An exported policy acts unchanged in the first iterations, in which the critic learns alone.
+    """
+    rows = read(path)
+    count = min(_GAINED, len(rows) // 2)
+    if not count:
+        return None
+    first, last = (_mean(part) for part in (rows[:count], rows[-count:]))
+    errors, falls = (
+        [row.get(name, math.nan) for row in (first, last)] for name in ("tracking_error", "falls")
+    )
+    return (
+        f"gained in training: commands are missed by {errors[1]:.2f} m/s, at first by "
+        f"{errors[0]:.2f} m/s, and {share(falls[1])} of episodes end in a fall, at first "
+        f"{share(falls[0])} (means of {counted(count, 'iteration')})"
+    )
 
 
 def _column(path: Path, name: str, iteration: float) -> list[float]:

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from draft.learn.policy.policy import open_policy
+from draft.learn.policy.reduced import open_for
+from draft.learn.task.stages import is_like
 from draft.learn.training.progress import PROGRESS, fastest
 
 if TYPE_CHECKING:
@@ -38,6 +39,6 @@ def commanded(run: Run, iteration: float = math.inf) -> float | None:
     origin, found = run.plan.origin, [fastest(run.folder / PROGRESS, iteration) or 0.0]
     file = origin.policy_file if origin is not None else None
     if file is not None and file.is_file():
-        policy = open_policy(file)
-        found.append(policy.forward if policy.stage == run.plan.stage else 0.0)
+        policy = open_for(file, run.plan.members)
+        found.append(policy.forward if is_like(policy.stage, run.plan.stage) else 0.0)
     return max(found) or None

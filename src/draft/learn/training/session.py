@@ -14,7 +14,7 @@ from draft.files import lock
 from draft.learn.bodies.legged import check_family
 from draft.learn.engine import machine
 from draft.learn.engine.machine import KINDS, NATIVE, Engine
-from draft.learn.policy.policy import open_policy
+from draft.learn.policy.reduced import open_for
 from draft.learn.policy.validity import check_policy
 from draft.learn.silence import quiet
 from draft.learn.task.stages import STAGES
@@ -47,9 +47,9 @@ def begin(
         plan: the training plan. Its `origin` is set here, and `see_ground` and `see_design` are set
             if the policy that it starts from sees the ground or its design.
         designs: each design's file as YAML, by name, such as "quadruped:cheetah".
-        origin: folder of the run whose policy a stage starts from, its ONNX file, or "family" for
-            the policy that ships; "scratch" for none; None for the run beside the folder of the
-            stage that this one starts from. An existing run keeps its own origin if this is None.
+        origin: folder of the run whose policy a stage starts from, its ONNX file, or "any" or
+            "family" for one that ships; "scratch" for none; None for the run beside the folder of
+            the stage that this one starts from. An existing run keeps its own if this is None.
 
     Raises:
         DraftError: the folder holds something else, or cannot be written; there is no run to
@@ -80,6 +80,9 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
         return replace(plan, origin=None)
     beside = folder.with_name(folder.name.replace(f"-{plan.stage}-", f"-{before}-"))
     file = policy_file(origin) if origin else None
+    if plan.mixed:
+        cause = "a training of several topologies starts from random networks"
+        raise DraftError(cause, 'omit `origin`, or use `origin="scratch"`')
     if file is not None:
         return _with_exported(plan, str(origin), file)
     source = Path(origin) if origin else beside
@@ -89,7 +92,7 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
         raise DraftError(cause, remedy)
     if origin is not None and not is_run(source):
         cause = f"there is no policy '{origin}' to start from"
-        remedy = "name the folder of a run, an ONNX file, 'family' or 'scratch'"
+        remedy = "name the folder of a run, an ONNX file, 'any', 'family' or 'scratch'"
         raise DraftError(cause, remedy)
     run = open_run(source)
     if run.plan.see_design:  # Such a policy can continue with any body of the same topology.
@@ -115,7 +118,7 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
 
 def _with_exported(plan: Plan, name: str, file: Path) -> Plan:
     """The plan with the exported policy that it starts from."""
-    policy = open_policy(file)
+    policy = open_for(file, plan.members)
     check_policy(policy, plan.members)
     layers = (policy.network.units(), plan.config.learning.hidden)
     if layers[0] != layers[1]:
@@ -155,7 +158,7 @@ class Setting:
         return self.devices == ("cpu",)
 
     def describe(self, run: Run, iterations: int) -> str:
-        """Engine, processes and expected minutes of training a run, in one line.
+        """Engine, processes, iterations and expected minutes of a training, in one line.
 
         Args:
             run: the run.
@@ -166,6 +169,9 @@ class Setting:
         kind = KINDS[self.engine.name]
         text = f"{kind} on {where} ({self.engine.why}), {counted(plan.environments, 'world')}"
         text += f" in {self.processes} processes" if self.processes > 1 else ""
+        joints = sorted(len(member.joints) for member in plan.members)
+        span = " to ".join(map(str, dict.fromkeys((joints[0], joints[-1]))))
+        text += f"; {counted(iterations, 'iteration')} for {span} joints"
         before = run.engine()
         if before not in (None, self.engine.name):
             text += f"; resumed from {before}: the same run, to single precision"
@@ -173,7 +179,8 @@ class Setting:
             return text
         steps = left * plan.environments * plan.config.learning.steps
         physics = plan.config.physics.decimation
-        time_left = machine.minutes(steps, physics, self.engine, self.processes, plan.ground)
+        mean = sum(joints) / len(joints)
+        time_left = machine.minutes(steps, physics, self.engine, self.processes, plan.ground, mean)
         slow = "" if self.engine.name == NATIVE else "; too slow for more than a trial"
         return f"{text}; about {time_left:.0f} min{slow}" if time_left >= 1 else f"{text}{slow}"
 

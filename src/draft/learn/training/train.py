@@ -114,6 +114,8 @@ def prepare(
     named = () if drawn else family  # Designs that are drawn take turns.
     _check_worlds(options.envs, named)
     recipe = RECIPES[options.recipe] if options.recipe else default(devices(options.device))
+    if given != [ANY.name]:
+        recipe = recipe.for_joints(max(len(member.joints) for member in family))
     config = recipe.config.with_values(numbers)
     plan = Plan.of(family, options, recipe, config, options.stage, options.seed, options.see_design)
     _check_worlds(plan.environments, named)

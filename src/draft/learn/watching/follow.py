@@ -68,18 +68,24 @@ def _serve(folder: Path, host: str, port: int, parent: int) -> None:
         time.sleep(_POLL)
     import torch
 
-    from draft.learn.watching.play import Player
-    from draft.learn.watching.web import Page
-
     torch.set_num_threads(1)
     engine = NATIVE if obstacle() is None else "warp"
     # The viewer prints each checkpoint that it loads, which would mix with the training's lines.
-    with (
-        contextlib.redirect_stdout(io.StringIO()),
-        contextlib.closing(Player(run, "cpu", engine=engine)) as player,
-        contextlib.closing(Page(player, run, host, port, follow=True)) as page,
-    ):
-        page.run()
+    with contextlib.redirect_stdout(io.StringIO()):
+        if run.plan.mixed:
+            from draft.learn.watching.side_by_side import SideBySide, SideBySidePage
+
+            shown = SideBySide(run)
+            with contextlib.closing(SideBySidePage(shown, run, host, port, follow=True)) as page:
+                page.run()
+        from draft.learn.watching.play import Player
+        from draft.learn.watching.web import Page
+
+        with (
+            contextlib.closing(Player(run, "cpu", engine=engine)) as player,
+            contextlib.closing(Page(player, run, host, port, follow=True)) as page,
+        ):
+            page.run()
 
 
 def _end_with(parent: int) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.legged import REFERENCE_LEG, by_topology, kind_of
 from draft.learn.bodies.slots import ranges, slot_features
 from draft.learn.policy.onnx_write import chain
-from draft.learn.policy.reduced import LAYOUT
+from draft.learn.policy.reduced import LAYOUT, LegsPolicy, open_legs_policy
 from draft.learn.task.stages import largest_of_any
 from draft.learn.training.ppo.checkpoint import read_checkpoint
 from draft.learn.training.progress import FASTEST, PROGRESS
@@ -46,9 +48,25 @@ def export_legs(run: Run, path: Path, iteration: int | None = None) -> None:
         arrays["obs_normalizer._mean"][0],
         arrays["obs_normalizer._std"][0] + _EPSILON,
         [(arrays[f"mlp.{layer}.weight"], arrays[f"mlp.{layer}.bias"]) for layer in layers],
-        _metadata(run, number),
+        _metadata(run, number) | {"action_std": _row(arrays["distribution.std_param"])},
     )
     write(path, model)
+
+
+def legs_of(run: Run, iteration: int | None = None) -> LegsPolicy:
+    """Return the policy of a run of several topologies.
+
+    Args:
+        run: the run.
+        iteration: iterations of the checkpoint; None for the last.
+
+    Raises:
+        DraftError: as `export_legs`.
+    """
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "legs.onnx"
+        export_legs(run, file, iteration)
+        return replace(open_legs_policy(file), file=run.checkpoint(iteration)[1])
 
 
 def _metadata(run: Run, iteration: int) -> dict[str, str]:

@@ -14,7 +14,7 @@ from draft.errors import DraftError, counted
 from draft.learn.engine.machine import WARP
 from draft.learn.engine.worlds.ranks import Ranks, rank_seed
 from draft.learn.policy.matching import match_of
-from draft.learn.policy.policy import open_policy
+from draft.learn.policy.reduced import open_for
 from draft.learn.training.ppo.agent import Runner, agent_settings
 from draft.learn.training.ppo.checkpoint import first_sentence, read_checkpoint, write_checkpoint
 from draft.learn.training.ppo.log import Row, Table
@@ -224,8 +224,9 @@ class Trainer:
         """Start with the policy of another run, or with the random one of the first process."""
         file = origin.policy_file if origin is not None else None
         if origin is not None and file is not None:
-            policy = open_policy(file)
-            of_joints = match_of(policy, self._run.plan.members[0])
+            members = self._run.plan.members
+            policy = open_for(file, members)
+            of_joints = match_of(policy, members[0])
             if isinstance(of_joints, str):
                 raise DraftError(f"{file} does not drive the robot: {of_joints}", _BROKEN)
             load_exported(self.runner.alg, policy, origin, of_joints, self._fit)
