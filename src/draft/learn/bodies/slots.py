@@ -72,6 +72,13 @@ def mirrored_features() -> NDArray[np.intp]:
     )
 
 
+def feature_names() -> list[str]:
+    """Name of each feature, such as "peak torque of left front knee"."""
+    joints = [f"{leg} {role}" for leg in LEGS for role in ROLES]
+    named = [(OF_JOINT, joints), (OF_LEG, [f"{leg} leg" for leg in LEGS])]
+    return [f"{what} of {one}" for kinds, of in named for what in kinds for one in of] + [*OF_BODY]
+
+
 def slots_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> Slots:
     """Return the slots of a robot.
 

@@ -168,7 +168,7 @@ def _of_file(policy: Policy, name: str, blind: bool = False) -> Source:
         members=(),
         stage=policy.stage,
         seed=policy.seed,
-        config=_config(policy),
+        config=config_of(policy),
         ground="flat",
         see_design=bool(len(policy.features)),
         see_ground=bool(len(policy.scan_points)),
@@ -187,7 +187,7 @@ def _of_file(policy: Policy, name: str, blind: bool = False) -> Source:
     return Source(name, *of_file, plan, *robot, region, *reach, network, line)
 
 
-def _config(policy: Policy) -> Config:
+def config_of(policy: Policy) -> Config:
     """Numbers of the task of an exported policy: those of recipe laptop, but for what it states."""
     own = {
         "physics.timestep": policy.timestep,

@@ -25,6 +25,8 @@ DESIGN = "design"  # Term of the observation that holds the features of the desi
 FOLDER = Path(__file__).parents[2] / "robots" / ROBOT / "policies"
 # Policies of all quadrupeds of a range: one that is blind, and one that sees the ground.
 FAMILY, CLIMBING_FAMILY = FOLDER / "family.onnx", FOLDER / "family_climb.onnx"
+# Policy of all legs, which `draft.learn.policy.reduced` opens.
+ANY = FOLDER.parents[1] / "policies" / "any.onnx"
 FAMILIES = {"walk": FAMILY, "run": FAMILY, "push": FAMILY, "climb": CLIMBING_FAMILY}
 Array = NDArray[np.float64]
 

@@ -196,9 +196,17 @@ def generate_kind(name: str, count: int, seed: int = 0) -> Bodies:
     Raises:
         DraftError: too few draws pass.
     """
-    kind = KINDS[name]
+    return draw_kind(KINDS[name], count, [list(KINDS).index(name), seed])
+
+
+def draw_kind(kind: Kind, count: int, seed: Sequence[int]) -> Bodies:
+    """Draw bodies of a kind, which may be one that no policy was trained with.
+
+    Raises:
+        DraftError: too few draws pass.
+    """
     base = load(kind.spec).resolve()
-    rng = np.random.default_rng([list(KINDS).index(name), seed])
+    rng = np.random.default_rng(seed)
 
     def draw(start: int, size: int) -> dict[str, Array]:
         drawn = kind.draw(_Random(rng, size))
