@@ -44,11 +44,11 @@ from benchmarks.roll_outs import (
     run_as_command,
     save,
 )
-from benchmarks.untrained import kinds as untrained
+from benchmarks.untrained import kinds as with_untrained
 from draft import parallel
 from draft.errors import DraftError
 from draft.learn.bodies.features import GRAVITY
-from draft.learn.bodies.generated import KINDS, draw_kind, generate_kind
+from draft.learn.bodies.generated import KINDS, generate_kind
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.engine.machine import cores
 from draft.learn.measuring.scalars import SURVIVAL
@@ -78,7 +78,6 @@ class Job:
     Attributes:
         legs: the policy.
         kind: name of the kind.
-        trained: whether it is one of the training.
         count: number of bodies.
         seed: seed of the draws.
         replicas: roll-outs of each body at each case.
@@ -87,7 +86,6 @@ class Job:
 
     legs: LegsPolicy
     kind: str
-    trained: bool
     count: int
     seed: int
     replicas: int
@@ -126,15 +124,13 @@ def measured(
     legs: LegsPolicy, bodies: int, seed: int, replicas: int, seconds: float
 ) -> dict[str, Any]:
     """All numbers, as the file of results has them."""
-    few = max(1, bodies // 8)
-    counts = {name: max(1, round(bodies * kind.share)) for name, kind in KINDS.items()}
     with tempfile.TemporaryDirectory() as folder:
-        others = dict.fromkeys(untrained(Path(folder)), few)
-    jobs = [
-        Job(legs, name, trained, count, seed, replicas, seconds)
-        for trained, of in ((True, counts), (False, others))
-        for name, count in of.items()
-    ]
+        names = list(with_untrained(Path(folder)))
+    few = max(1, bodies // 8)
+    counts = {
+        name: max(1, round(bodies * KINDS[name].share)) if name in KINDS else few for name in names
+    }
+    jobs = [Job(legs, name, count, seed, replicas, seconds) for name, count in counts.items()]
     jobs.sort(key=lambda job: -job.count)  # The longest begin.
     workers = min(cores(), len(jobs))
     rows = {job.kind: row for job, row in parallel.run(jobs, _kind, workers)}
@@ -145,7 +141,7 @@ def measured(
         "seed": seed,
         "replicas": replicas,
         "seconds": seconds,
-        "kinds": [rows[name] for name in (*counts, *others)],
+        "kinds": [rows[name] for name in names],
         "action": {"joints": len(humanoid.joints), "ms": action_time(legs, humanoid)},
         "humanoid": humanoid_speed(legs, humanoid, replicas, seconds),
     }
@@ -171,13 +167,9 @@ def half(legs: int) -> str:
 def _kind(job: Job) -> dict[str, Any]:
     """Draw bodies of a kind and roll them out."""
     quiet()
-    if job.trained:
-        members = generate_kind(job.kind, job.count, job.seed).members
-    else:
-        with tempfile.TemporaryDirectory() as folder:
-            of_all = untrained(Path(folder))
-            place = len(KINDS) + list(of_all).index(job.kind)
-            members = draw_kind(of_all[job.kind], job.count, [place, job.seed]).members
+    with tempfile.TemporaryDirectory() as folder:
+        kinds = with_untrained(Path(folder))
+        members = generate_kind(job.kind, job.count, job.seed, kinds).members
     legs = len(members[0].feet)
     policies = [job.legs.of_robot(member) for member in members]
     options = {"replicas": job.replicas, "seconds": job.seconds, "seed": job.seed}
@@ -185,7 +177,7 @@ def _kind(job: Job) -> dict[str, Any]:
     outside = [float(np.abs(job.legs.outside(member)).max()) for member in members]
     return {
         "kind": job.kind,
-        "trained": job.trained,
+        "trained": job.kind in KINDS,
         "bodies": len(members),
         "legs": legs,
         "joints": len(members[0].joints),
@@ -248,10 +240,10 @@ def bars(found: Mapping[str, Any]) -> list[dict[str, Any]]:
         value = _pooled(own, at, "error")
         rows.append(bar(f"{group}, error there, per sqrt(g L)", value, error, at_least=False))
     for case, asked in (("sideways", SIDEWAYS), ("turn", TURN)):
-        gaps = {name: _gap(row, case, asked) for name, row in kinds.items() if row["trained"]}
-        worst = max(gaps, key=lambda name: math.inf if gaps[name] is None else gaps[name])
+        gaps = [(_gap(row, case, asked), name) for name, row in kinds.items() if row["trained"]]
+        gap, worst = max(gaps)
         what = f"{case} {asked:g}, relative error, worst kind: {worst}"
-        rows.append(bar(what, gaps[worst], FOLLOWED, "%", at_least=False))
+        rows.append(bar(what, gap if gap < math.inf else None, FOLLOWED, "%", at_least=False))
     for group, share in PUSHED.items():
         own = [kinds[name] for name in GROUPS[group][0]]
         what = f"{group}, up after pushes of {PUSH:g} sqrt(g L)"
@@ -280,10 +272,10 @@ def _pooled(rows: Sequence[Mapping[str, Any]], case: str, what: str) -> float | 
     return sum(value * share for value, share in pairs) / weight if weight else None
 
 
-def _gap(row: Mapping[str, Any], case: str, asked: float) -> float | None:
-    """Relative error of the mean velocity along a command."""
+def _gap(row: Mapping[str, Any], case: str, asked: float) -> float:
+    """Relative error of the mean velocity along a command; infinite if all fall."""
     reached = row["cases"][case]["reached"]
-    return None if reached is None else abs(reached - asked) / asked
+    return math.inf if reached is None else abs(reached - asked) / asked
 
 
 COLUMNS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
@@ -312,7 +304,7 @@ def _up_and_reached(row: Mapping[str, Any], case: str) -> str:
 
 
 def _short(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
+    return "-" if value is None else f"{round(value, 2) + 0.0:.2f}"  # No "-0.00".
 
 
 def show(found: Mapping[str, Any], console: Console) -> None:

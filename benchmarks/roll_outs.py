@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 SECONDS, SETTLE = 12.0, 3.0  # Of a roll-out, and its part that is not measured [s].
 PUSH = 0.5  # Largest velocity of a push, per sqrt(g L), along x and along y.
 SIDEWAYS, TURN = 0.2, 0.3
-WIDTH = 130  # Of tables [characters].
+WIDTH = 140  # Of tables [characters].
 FOLLOWED = 1 / 3  # Largest relative error of a velocity that counts as followed.
 
 
@@ -107,7 +107,7 @@ class Rolled:
         wanted = np.array(self.cases[case].command)
         gap = np.linalg.norm(self.velocity[case] - wanted, axis=-1)
         near = gap <= FOLLOWED * np.linalg.norm(wanted) + 1e-9
-        return float((near & ~self.fell[case]).mean())
+        return float((near & (self.fell[case] == 0)).mean())
 
     def limit(self, case: int, robot: int = 0) -> dict[str, Any] | None:
         """Joint class of a robot nearest its limit, and whether torque or speed; None if unknown.
@@ -251,7 +251,7 @@ def _shares(classes: Sequence[str], counts: Array) -> Mapping[str, Mapping[str, 
 
 
 def _mean(values: Array, fell: Array) -> float | None:
-    kept = values[~fell]
+    kept = values[fell == 0]
     return float(kept.mean()) if kept.size else None
 
 

@@ -52,9 +52,10 @@ _LONGER = 1.5  # A body for eight legs over one for six.
 
 
 def kinds(folder: Path) -> Mapping[str, Kind]:
-    """Kinds that were never trained, by name; their specs are written below a folder."""
+    """Kinds that were never trained, after those that are; specs are written below a folder."""
     quadruped, hexapod = KINDS["quadruped"], KINDS["hexapod"]
     return {
+        **KINDS,
         "knees O": replace(quadruped, draw=_knees_apart),
         "five joints a leg": replace(quadruped, spec=_five_joints(folder, quadruped)),
         "eight legs": replace(hexapod, spec=_eight_legs(folder, hexapod), draw=_longer),

@@ -190,23 +190,17 @@ def together(kinds: Sequence[Bodies]) -> Bodies:
     )
 
 
-def generate_kind(name: str, count: int, seed: int = 0) -> Bodies:
-    """Draw bodies of one kind, by its name in `KINDS`.
+def generate_kind(
+    name: str, count: int, seed: int = 0, kinds: Mapping[str, Kind] = KINDS
+) -> Bodies:
+    """Draw bodies of one kind, by its name; other kinds than `KINDS` can be drawn for tests.
 
     Raises:
         DraftError: too few draws pass.
     """
-    return draw_kind(KINDS[name], count, [list(KINDS).index(name), seed])
-
-
-def draw_kind(kind: Kind, count: int, seed: Sequence[int]) -> Bodies:
-    """Draw bodies of a kind, which may be one that no policy was trained with.
-
-    Raises:
-        DraftError: too few draws pass.
-    """
+    kind = kinds[name]
     base = load(kind.spec).resolve()
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng([list(kinds).index(name), seed])
 
     def draw(start: int, size: int) -> dict[str, Array]:
         drawn = kind.draw(_Random(rng, size))
