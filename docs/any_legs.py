@@ -10,34 +10,39 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import mujoco
+from draft.offscreen import prefer_offscreen
 
-from benchmarks import any_legs, zero_shot
-from benchmarks.roll_outs import PUSH, number, run_as_command
-from docs.pictures import shrink
-from draft.errors import counted
-from draft.files import write
-from draft.learn.bodies.features import GRAVITY
-from draft.learn.bodies.legged import LeggedRobot
-from draft.learn.policy.playback import Playback, Scenario
-from draft.learn.policy.policy import ANY, Policy
-from draft.learn.policy.reduced import LegsPolicy, open_legs_policy
-from draft.twins.compare import Comparison, compare_twin
-from draft.validation.arms import by_maker
+prefer_offscreen()  # before MuJoCo is imported
+
+import mujoco  # noqa: E402
+
+from benchmarks import any_legs, zero_shot  # noqa: E402
+from benchmarks.roll_outs import PUSH, number, run_as_command  # noqa: E402
+from docs.pictures import shrink  # noqa: E402
+from draft.errors import counted  # noqa: E402
+from draft.files import write  # noqa: E402
+from draft.learn.bodies.features import GRAVITY  # noqa: E402
+from draft.learn.bodies.legged import LeggedRobot  # noqa: E402
+from draft.learn.policy.playback import Playback, Scenario  # noqa: E402
+from draft.learn.policy.policy import ANY, Policy  # noqa: E402
+from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
+from draft.learn.policy.strip import INTERVAL, Shot, moments, save  # noqa: E402
+from draft.twins.compare import Comparison, compare_twin  # noqa: E402
+from draft.validation.arms import by_maker  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, IMAGES = ROOT / "docs/any-legs.md", ROOT / "docs/images/any_legs"
 UNSEEN = ROOT / "examples/results/any_legs.json"
 REAL = ROOT / "examples/results/zero_shot.json"
-PICTURES, SECONDS, WIDTH, TINTS = 12, 4.0, 800, 64
-_SHOTS = 5  # Of a strip.
+# Number of strips, shots of each, time that a robot walks [s], and sizes [pixels].
+PICTURES, SHOTS, SECONDS, SIZE, WIDTH = 12, 6, 4.0, (640, 360), 720
 _MASSES = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 # Why robots do not walk, by name, as found by looking at them.
 CAUSES: Mapping[str, str] = {}
@@ -131,19 +136,31 @@ class _Maker(Playback):
 
 
 def strip(legs: LegsPolicy, file: Path, path: Path) -> None:
-    """Draw a film strip of a robot that walks at the command of its bar."""
-    from draft.learn.policy.video import film
+    """Draw a film strip of a robot at the command of its bar, unless it falls."""
+    from draft.learn.policy.video import Film
 
     twin = compare_twin(file, poses=2)
     member = by_maker(twin)
     speed = zero_shot.AT[zero_shot.group_of({"legs": len(member.feet)})]
     root = math.sqrt(GRAVITY * member.leg_length)
     player = _Maker(legs.of_robot(member), twin, member, speed * root)
-    with tempfile.TemporaryDirectory() as scratch:
-        outcome = film(player, SECONDS, Path(scratch) / "film.mp4", path, _SHOTS)
-    shrink(path, WIDTH, TINTS)
-    size = path.stat().st_size / 1000
-    print(f"{path}: {outcome.speed / root:.2f}, {counted(outcome.falls, 'fall')}, {size:.0f} kB")
+    wanted = moments(player.steps(SECONDS), SHOTS, player.period)
+    shots: list[Shot] = []
+    with contextlib.closing(Film(player, SIZE)) as camera:
+
+        def shoot(step: int) -> None:
+            if step in wanted:
+                camera.frame(INTERVAL)
+                shots.append(camera.shot(step * player.period))
+
+        outcome = player.play(SECONDS, shoot)
+    words = f"{path.stem}: {outcome.speed / root:.2f} sqrt(g L)"
+    if outcome.falls:
+        print(f"{words}, {counted(outcome.falls, 'fall')}: left out")
+        return
+    save(path, shots)
+    shrink(path, WIDTH)
+    print(f"{words}, {path.stat().st_size / 1000:.0f} kB")
 
 
 def page(unseen: Mapping[str, Any], real: Mapping[str, Any], images: Sequence[str]) -> str:
