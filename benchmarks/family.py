@@ -176,11 +176,11 @@ def _row(
         kick = measure(*_of(runs["push"]))["kick"] if "push" in runs else None
         row["alone"] = {**measure(*_of(runs["velocity"])), "kick": kick}
         _write(file, row)
-    source = open_source(family)
+    source = open_source(family, robot=body.robot)
     if row.get("policy") != source.digest:
         row.pop("tuned", None)
         row["policy"] = source.digest
-        row["family"] = measure(source.plan, source.actor("cpu"))
+        row["family"] = measure(source.plan, source.drive.actor("cpu"))
         _write(file, row)
     if tune and "tuned" not in row:
         name = f"tuned-{source.digest[:6]}"

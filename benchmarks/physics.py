@@ -50,9 +50,6 @@ def main(
         only: labels of settings; all by default.
         out: JSON file for the numbers.
     """
-    source, climber = open_source(policy, blind=True), None
-    if stairs:
-        climber = source if policy else climbing_family()
     chosen = [
         one
         for one in SETTINGS
@@ -61,6 +58,9 @@ def main(
     rows = []
     for name in names:
         member = _robot(name, robots)
+        source, climber = open_source(policy, blind=True, robot=member), None
+        if stairs:
+            climber = source if policy or source.of_any_legs else climbing_family()
         print(f"| {name} | {' | '.join(SHOWN)} |")
         measured = under_physics(source, member, chosen, replicas=replicas, climber=climber)
         for one, found in measured:

@@ -64,10 +64,10 @@ def main(numbers: tyro.conf.OmitArgPrefixes[Numbers]) -> None:
 
 def measured(numbers: Numbers) -> dict[str, Curve]:
     """Curves of all bodies together: `SPEED` over the commands, `PUSH` over the kicks."""
-    source = open_source(numbers.family)
     robots = tuple(body.robot for body in drawn(numbers.bodies, numbers.seed))
+    source = open_source(numbers.family, robot=robots[0])
     rolls = (COMMANDS, KICKS, numbers.replicas, numbers.seconds, cores())
-    return rolled_out(robots, source.plan, source.actor("cpu"), *rolls)
+    return rolled_out(robots, source.plan, source.drive.actor("cpu"), *rolls)
 
 
 if __name__ == "__main__":

@@ -125,7 +125,11 @@ def _caused(found: RealRobot, policy: str | None) -> dict[str, dict[str, float]]
     """Causes of the differences between both columns, of robots with published figures."""
     if not found.policy or not found.verdicts:
         return {}
-    return causes(found.twin, open_source(policy, blind=True), *setting("auto", "auto"))
+    return causes(
+        found.twin,
+        open_source(policy, blind=True, robot=predicted(found.twin)),
+        *setting("auto", "auto"),
+    )
 
 
 def train_own(key: str, file: Path, folder: Path, seed: int, iterations: int) -> None:

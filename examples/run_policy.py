@@ -1,4 +1,4 @@
-"""A shipped policy in plain MuJoCo, with NumPy alone: python examples/run_policy.py 2.5 [m/s].
+"""A shipped policy in plain MuJoCo, with NumPy alone: python examples/run_policy.py cheetah 2.5.
 
 `draft build quadruped --design cheetah --out cheetah` writes the robot.xml that is stepped here.
 `draft.learn.policy.controller.Controller` does the same for any model, and sees steps too.
@@ -10,27 +10,30 @@ import mujoco
 import numpy as np
 
 import draft
+from draft.design.references import open_design
+from draft.model.scene import home_position
 
-command = np.array([float(sys.argv[1]) if len(sys.argv) > 1 else 2.5, 0.0, 0.0])
-policy = draft.policy("cheetah", "run")
-robot = draft.load("quadruped").resolve("cheetah").build()
+name, speed = sys.argv[1:3] if len(sys.argv) > 2 else ("cheetah", 2.5)  # or humanoid 0.5 [m/s]
+policy = draft.policy(name, "run")
+design = open_design(name)
+command = np.array([float(speed), 0.0, 0.0])
 
-spec = mujoco.MjSpec.from_string(robot.xml)  # or MjSpec.from_file("cheetah/robot.xml")
+spec = mujoco.MjSpec.from_string(design.build().xml)  # or MjSpec.from_file("cheetah/robot.xml")
 spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
 spec.option.timestep = policy.timestep
 spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 model = spec.compile()
 data = mujoco.MjData(model)
-data.qpos[2] = 0.46
-data.qpos[7:] = policy.home + np.random.default_rng(0).uniform(-0.1, 0.1, 12)
+data.qpos[:] = home_position(design)
+data.qpos[7:] += np.random.default_rng(0).uniform(-0.1, 0.1, len(policy.home))
 
-action = np.zeros(12)
+action = np.zeros(len(policy.home))
 while data.time < 10.0:
     mujoco.mj_forward(model, data)
     observation = (
         data.sensor("imu_lin_vel").data,  # [m/s], in the trunk's frame
         data.sensor("imu_ang_vel").data,  # [rad/s]
-        -data.body("trunk").xmat[6:],  # gravity's direction in the trunk's frame
+        -data.xmat[1][6:],  # gravity's direction in the trunk's frame
         data.qpos[7:] - policy.home,  # [rad]
         data.qvel[6:],  # [rad/s]
         action,  # the last one

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from draft.imports.importer import import_robot
     from draft.learn.measuring.evaluation import evaluate
     from draft.learn.measuring.surface import surface
+    from draft.learn.policy.chosen import policy
     from draft.learn.policy.playback import play
-    from draft.learn.policy.policy import policy
     from draft.learn.training.train import train
     from draft.model import Model
     from draft.model.export import export
@@ -97,7 +97,7 @@ _MODULES = {
     "metrics": "",
     "optimise": "draft.explore.optimise",
     "play": "draft.learn.policy.playback",
-    "policy": "draft.learn.policy.policy",
+    "policy": "draft.learn.policy.chosen",
     "real_robot": "draft.validation.compare",
     "report": "draft.reporting.report",
     "screen": "draft.explore.screen",

@@ -78,7 +78,7 @@ def test_a_design_is_evaluated_with_a_policy(command: Command) -> None:
     policy = draft.policy("cheetah", "walk").file  # It does not observe its design.
     command(f"{asked} --test walk --policy {policy} --out there")
     assert Path("there/dog-cheetah-walk/nominal-walking/summary.json").is_file()
-    assert "humanoid: the robot has 2 legs" in command("evaluate humanoid", code=2).err
+    assert "hopper cannot be trained: it has one leg" in command("evaluate hopper", code=2).err
     assert "--checkpoint is for runs" in command.refuses("evaluate dog --checkpoint 3")
 
 

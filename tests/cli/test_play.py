@@ -92,7 +92,7 @@ NO_RUN = "is neither a run of 'draft train' nor a design"
         # The policy of a family is no file for another robot.
         ("quadruped --onnx", "--onnx is for runs and for bear, "),
         (
-            "humanoid",
+            "humanoid --skill climb",
             "no policy drives the joints of humanoid: the robot has 2 legs, and the policy drives "
             "4\n  train one: draft train humanoid\n",
         ),

@@ -95,6 +95,8 @@ def test_a_speed_beyond_reach_says_what_was_reached() -> None:
     assert found.conflict is not None
     assert found.conflict.conditions == (f"{SPEED} >= 4.3",)
     assert re.match(rf"{re.escape(SPEED)} >= 4.3, and it is [34]\.\d+", found.conflict.misses[0])
+    (note,) = found.notes
+    assert re.match(r"the policy was commanded up to \d\.\d\d m/s at this size", note)
 
 
 def test_conditions_in_closed_form_that_conflict_need_no_rollout() -> None:

@@ -164,15 +164,18 @@ def test_a_misspelt_metric_in_a_condition_names_the_nearest(
 
 @pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize(
-    ("robot", "message"),
-    [("hopper", "one leg with a knee and a foot"), ("humanoid", "does not drive the joints of")],
+    ("robot", "policy", "message"),
+    [
+        ("hopper", None, "one leg with a knee and a foot"),
+        ("humanoid", str(FAMILY), "does not drive the joints of"),
+    ],
 )
 def test_a_robot_that_the_policy_cannot_drive_ends_a_sweep_before_it_begins(
-    robot: str, message: str, tmp_path: Path
+    robot: str, policy: str | None, message: str, tmp_path: Path
 ) -> None:
     vary, out = {"thigh_length": [0.3]}, tmp_path / "sweep"
     with pytest.raises(DraftError, match=message):
-        draft.sweep(robot, vary=vary, n=1, metrics=["learned.kick"], out=out)
+        draft.sweep(robot, vary=vary, n=1, metrics=["learned.kick"], policy=policy, out=out)
     assert not out.exists()
 
 

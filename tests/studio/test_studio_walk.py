@@ -116,12 +116,12 @@ def test_the_dot_of_each_joint_lies_below_the_line_of_its_motor(session: Session
     assert max(loads, key=lambda load: load.share).joint in card
 
 
-def test_a_robot_that_no_policy_drives_stands_and_the_command_is_named(tmp_path: Path) -> None:
-    session = Session(Library(draft.load("humanoid"), tmp_path))
+def test_a_robot_that_no_policy_drives_stands_and_it_is_said_why(tmp_path: Path) -> None:
+    session = Session(Library(draft.load("hopper"), tmp_path))
     walker = walking(session, 0.2)
     assert walker.on
     assert walker.walk is None
-    assert "draft train humanoid" in live_cards.walking(walker)
+    assert "use a robot with left and right legs" in live_cards.walking(walker)
     assert walker.loads() == []
 
 

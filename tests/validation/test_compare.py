@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("mjlab")
 
 import draft
+from draft.errors import DraftError
 from draft.learn.training.options import SliceOptions
 from draft.learn.training.run import open_run
 from draft.validation import own
@@ -43,7 +44,13 @@ def test_each_column_may_have_a_policy_of_its_own_of_the_same_seed(
     assert found.policy == str(tmp_path)
 
 
-def test_a_robot_that_no_policy_drives_is_measured_in_closed_form(tmp_path: Path) -> None:
+def test_a_robot_that_no_policy_drives_is_measured_in_closed_form(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none(*_: object, **__: object) -> None:
+        raise DraftError("no policy", "train one")
+
+    monkeypatch.setattr("draft.validation.compare.open_source", none)
     robot = draft.export(draft.load("humanoid").resolve(), tmp_path) / "robot.urdf"
     found = draft.real_robot(robot, **QUICK)
     assert {"mass", "payload_peak", "jump_height", "standing_power"} == found.maker.keys() - {
@@ -52,6 +59,14 @@ def test_a_robot_that_no_policy_drives_is_measured_in_closed_form(tmp_path: Path
     }
     (why, _) = found.notes
     assert why.startswith("not measured by roll-outs: ")
+
+
+def test_a_humanoid_is_measured_with_the_policy_of_all_legs(tmp_path: Path) -> None:
+    robot = draft.export(draft.load("humanoid").resolve(), tmp_path) / "robot.urdf"
+    found = draft.real_robot(robot, **QUICK)
+    assert found.policy == "any legs"
+    assert "top_speed" in found.maker
+    assert not any(note.startswith("not measured by roll-outs") for note in found.notes)
 
 
 def test_guessed_torques_are_told(tmp_path: Path) -> None:

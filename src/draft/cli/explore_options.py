@@ -77,16 +77,17 @@ def robot(reference: str, design: str | None) -> Spec | Design:
     return choice.spec if choice.design is None else choice.resolve()
 
 
-def print_policy(policy: str | Path | None) -> None:
+def print_policy(policy: str | Path | None, subject: Spec | Design) -> None:
     """Print the iteration of the policy of learned metrics on stderr; nothing for the shipped one.
 
     Raises:
         DraftError: it cannot be read, or does not observe its design.
     """
     if policy is not None:
-        from draft.learn.measuring.policies import open_source
+        from draft.learn.measuring.policies import source_for
 
-        print(spelt(open_source(policy).line), file=sys.stderr, flush=True)
+        design = subject.resolve() if isinstance(subject, Spec) else subject
+        print(spelt(source_for(policy, design).line), file=sys.stderr, flush=True)
 
 
 @contextmanager

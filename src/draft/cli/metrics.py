@@ -76,7 +76,7 @@ def main(
     if learned:
         from draft.learn.measuring.policy_metrics import of_policy
 
-        print_policy(policy)
+        print_policy(policy, resolved)
         with if_interrupted(NOTHING):
             measured = of_policy(resolved, policy=policy, outside=True)
         found |= {name: scalar(x) for name, x in measured.items()}
@@ -106,9 +106,11 @@ def _list() -> Table:
 def _outside(design: Design, policy: str | Path | None) -> str:
     """What of a design lies outside the region of validity of a policy; "" for nothing."""
     from draft.learn.bodies.legged import legged_robot
-    from draft.learn.measuring.policies import open_source
+    from draft.learn.measuring.policies import source_for
 
-    return open_source(policy).warning(legged_robot(design)) if design.accepted else ""
+    if not design.accepted:
+        return ""
+    return source_for(policy, design).warning(legged_robot(design))
 
 
 def _print(

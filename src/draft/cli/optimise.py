@@ -26,7 +26,7 @@ def main(
     from draft.explore.optimise import optimise
 
     robot = x.robot(reference, design)
-    x.print_policy(settings.policy)
+    x.print_policy(settings.policy, robot)
     with if_interrupted(f"the trials so far are kept; {AGAIN}"), x.bar("optimise") as progress:
         front = optimise(robot, **x.given(settings, values, payload, progress))
     out = str(settings.out)

@@ -41,14 +41,14 @@ def main(
     start = time.perf_counter()
     prefer_offscreen()
     from draft.design.references import open_designs
-    from draft.learn.policy.policy import open_policy
+    from draft.learn.policy.reduced import open_any
     from draft.reporting.report import write_report
     from draft.reporting.subjects import comparison, subjects, table
 
     if policy and not walk:
         raise DraftError("--policy is for robots that walk", "add --walk")
     with if_interrupted(NOTHING):
-        found = subjects(open_designs(designs), walk, [open_policy(file) for file in policy])
+        found = subjects(open_designs(designs), walk, [open_any(file) for file in policy])
         paths = write_report(found, out, figures)
     if json:
         record = table(found, comparison(found)) | {"out": [str(path) for path in paths]}

@@ -92,7 +92,7 @@ def main(
         return _over_ranges(resolved, vary, screen, of, n, seed, figure, json)
     learned = any(name in LEARNED for name in of)
     if learned:
-        x.print_policy(rolled.policy)
+        x.print_policy(rolled.policy, resolved)
     elif rolled.policy is not None:
         raise DraftError("--policy is for learned metrics", "add --of learned.top_speed")
     with if_interrupted(NOTHING), x.bar("bodies") if learned else nullcontext() as progress:

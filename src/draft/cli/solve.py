@@ -80,7 +80,7 @@ def main(
     resolved, _ = open_design(reference, design, values, payload)
     learned = any(PREFIX in text for text in conditions)
     if learned:
-        x.print_policy(rolled.policy)
+        x.print_policy(rolled.policy, resolved)
     elif rolled.policy is not None:
         raise DraftError("--policy is for learned metrics", "name one, or omit it")
     with if_interrupted(NOTHING), x.bar("bodies") if learned else nullcontext() as progress:

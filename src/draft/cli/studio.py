@@ -57,7 +57,7 @@ def main(
     check_folder(out)
     check_folder(designs, "designs")
     need("viser", "view")
-    from draft.learn.policy.policy import open_policy
+    from draft.learn.policy.reduced import open_any
     from draft.learn.policy.validity import check_drives
     from draft.model.model import preview
     from draft.serving.guard import check_address
@@ -80,7 +80,7 @@ def main(
         if name not in known:
             cause = f"--set {name}: there is no such parameter or number of an actuator class"
             raise DraftError(cause, suggest(name, known, "fields"))
-    policies = [open_policy(file) for file in policy]
+    policies = [open_any(file) for file in policy]
     if policies:
         check_drives(policies, preview(spec.resolve()))
     name = choice.design or ""

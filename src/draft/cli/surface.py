@@ -48,12 +48,12 @@ def main(
     check_folder(out)
     from draft.design.references import find_design
     from draft.learn.measuring import surface as surfaces
-    from draft.learn.measuring.policies import open_source
+    from draft.learn.measuring.policies import source_for
 
     policy = None if chosen.policy is None else str(chosen.policy)
-    source = open_source(policy)
-    print(spelt(source.line), flush=True)
     robot = find_design(reference, design).resolve(parse_values(values))
+    source = source_for(policy, robot)
+    print(spelt(source.line), flush=True)
     with if_interrupted(NOTHING), x.bar("surface", at_once=True) as progress:
         asked = settings.model_copy(update={"progress": progress})
         found = surfaces.surface(robot, vary, source, **dict(asked))

@@ -22,5 +22,5 @@ def main(
     from draft.explore.sweep import sweep
 
     robot = x.robot(reference, design)
-    x.print_policy(settings.policy)
+    x.print_policy(settings.policy, robot)
     return x.run_rows(sweep, robot, settings, str(settings.out), values, payload, json)

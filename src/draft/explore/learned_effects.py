@@ -20,7 +20,7 @@ from draft.learn.bodies.legged import legged_robot
 from draft.learn.measuring.evaluation_options import BodyRollOuts
 from draft.learn.measuring.learned_metrics import speeds
 from draft.learn.measuring.paired_metrics import Paired, paired
-from draft.learn.measuring.policies import Source, open_source
+from draft.learn.measuring.policies import Source, source_for
 from draft.values import Array, Value
 
 _TWO_SIDED = 0.975
@@ -109,11 +109,11 @@ def open_policy(design: Design, settings: EffectSettings) -> Source:
     Raises:
         DraftError: the filter refuses the design, or the policy does not drive it.
     """
-    source = open_source(settings.policy)
     if not design.accepted:
         cause = f"{design.reference} is refused, and learned metrics are of accepted designs"
         raise DraftError(cause, "see `draft check`, or omit the learned metrics")
-    source.match(legged_robot(design))
+    source = source_for(settings.policy, design)
+    source.drive.check(legged_robot(design))
     return source
 
 

@@ -24,7 +24,6 @@ from draft.explore.goals import Constraint
 from draft.explore.learned_effects import open_policy, silent
 from draft.explore.settings import TargetSettings
 from draft.explore.solve import Conflict, Search, Solution, by_rollouts
-from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.measuring.evaluation_options import BodyRollOuts
 from draft.learn.measuring.learned_metrics import walkers
@@ -33,7 +32,7 @@ from draft.metrics import of_design
 from draft.values import Array, Value
 from draft.variation.axes import Axis
 
-_INSIDE = "learned.inside"
+_INSIDE, _TOP_SPEED = "learned.inside", "learned.top_speed"
 _PAIRS, _STEP = 12, 0.06  # Of the first batch: pairs of designs, and their change.
 _EACH, _ROUNDS = 10, 3  # Bodies of a round; rounds.
 _BASE = 16  # Roll-outs of the given design, over those of a first look.
@@ -88,12 +87,14 @@ class RolledOutSearch(Search):
         self._closed = tuple(one for one in conditions if one not in self._learned)
         named = {name for one in self._learned for name in one.holds.metrics}
         self._names = (*sorted(named - {*self._metrics, _INSIDE}), _INSIDE)
-        self._outside = self._source.warning(legged_robot(design))
+        robot = legged_robot(design)
+        self._outside = self._source.warning(robot)
+        self._ends = self._source.drive.ends(robot)
         self._done = 0
         self._base: dict[str, tuple[float, Array]] = {}
         count = len(axes)
         self._rolled: _Rolled | None = None
-        self._seen = np.zeros((0, count)), np.zeros((0, len(self._source.region.low)))
+        self._seen = np.zeros((0, count)), np.zeros((0, len(self._ends[0])))
         self._fits: tuple[Array, ...] = ()
 
     def run(self) -> Solution:
@@ -147,9 +148,15 @@ class RolledOutSearch(Search):
         return self._solution(least, Conflict(together, self._misses(least)))
 
     def _solution(self, best: Array, conflict: Conflict | None) -> Solution:
-        notes = ()
+        notes = []
         if self._outside:
-            notes = (f"the learned metrics are of a design {self._outside}",)
+            notes.append(f"the learned metrics are of a design {self._outside}")
+        if any(_TOP_SPEED in one.holds.metrics for one in self._learned):
+            most = self._source.forward_for(legged_robot(self._design))
+            notes.append(
+                f"the policy was commanded up to {most:.2f} m/s at this size: "
+                "a top speed near that is a lower bound"
+            )
         return Solution(
             design=self._resolved(best) if best.any() else self._design,
             change=float(np.sqrt(np.mean(best**2))),
@@ -157,7 +164,7 @@ class RolledOutSearch(Search):
             conflict=conflict,
             tried=self.tried,
             rollouts=self._done,
-            notes=notes,
+            notes=tuple(notes),
         )
 
     def _spread(self, centre: Array) -> Array:
@@ -200,14 +207,14 @@ class RolledOutSearch(Search):
         members, _ = walkers(self._source, many, None)
         if not members:
             return drawn[:0]
-        own = np.array(family_features(tuple(members.values())))
+        drive = self._source.drive
+        own = drive.features([*members.values()])
         rows = np.array([*members])
         seen = zip(self._seen, (drawn[rows], own), strict=True)
         drawn_before, own_before = (np.concatenate(pair) for pair in seen)
         self._seen = drawn_before, own_before
-        region, match = self._source.region, self._source.match
         inside = [
-            bool(self._outside) or region.includes(one, features, match(one).joints)
+            bool(self._outside) or drive.includes(one, features)
             for one, features in zip(members.values(), own, strict=True)
         ]
         return drawn[rows[inside]]
@@ -330,7 +337,7 @@ class RolledOutSearch(Search):
         chance = np.median(known.deviation[:, place]) / np.sqrt(_TIMES)
         gap = inputs @ self._fits[0][:, place] + _SURE * chance
         if not self._outside:
-            low, high = np.array(self._source.region.low), np.array(self._source.region.high)
+            low, high = self._ends
             features = inputs @ self._fits[1]
             beyond = np.maximum(features - high, low - features) / np.maximum(high - low, 1e-9)
             gap = np.maximum(gap, beyond.max(axis=1, initial=-1.0))

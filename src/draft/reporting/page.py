@@ -138,7 +138,8 @@ def _walk(gait: Gait) -> str:
     note = f"; {escape(gait.note)}" if gait.note else ""
     if gait.walks:
         return f"walks at {gait.speed:.2f} m/s; asked for {gait.command:.2f} m/s{note}"
-    remedy = f"; to train a policy for it: <code>{escape(gait.remedy)}</code>"
+    command = f"; to train a policy for it: <code>{escape(gait.remedy)}</code>"
+    remedy = command if gait.remedy else ""
     return f"stands: {escape(gait.reason)}{note}{remedy}"
 
 

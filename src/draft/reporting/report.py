@@ -8,7 +8,7 @@ from pathlib import Path
 from draft import files
 from draft.design import Design
 from draft.design.references import open_designs
-from draft.learn.policy.policy import open_policy
+from draft.learn.policy.reduced import open_any
 from draft.reporting.page import page
 from draft.reporting.subjects import Subject, subjects
 from draft.spec import Spec
@@ -43,7 +43,7 @@ def report(
             the extra `report` (with `figures`, `figures`) is not installed.
     """
     given = [designs] if isinstance(designs, (Design, Spec, str, Path)) else designs
-    own = [open_policy(file) for file in policies]
+    own = [open_any(file) for file in policies]
     return write_report(subjects(open_designs(given), walk, own), Path(out), figures)
 
 

@@ -19,7 +19,7 @@ from draft.values import plain, scalar
 
 if TYPE_CHECKING:
     from draft.learn.policy.gait import Gait
-    from draft.learn.policy.policy import Policy
+    from draft.learn.policy.reduced import AnyPolicy
 
 MOST = 12
 
@@ -48,7 +48,7 @@ class Subject:
 
 
 def subjects(
-    designs: Sequence[Design], walk: bool = False, policies: Sequence[Policy] = ()
+    designs: Sequence[Design], walk: bool = False, policies: Sequence[AnyPolicy] = ()
 ) -> list[Subject]:
     """Compile and measure designs for a report.
 
@@ -77,7 +77,7 @@ def subjects(
     return found
 
 
-def _gait(model: Model, policies: Sequence[Policy]) -> Gait:
+def _gait(model: Model, policies: Sequence[AnyPolicy]) -> Gait:
     from draft.learn.policy.gait import record  # reports without gaits do not need it
 
     return record(model, policies=policies)

@@ -36,7 +36,7 @@ def region(walker: Walker) -> str:
     if walker.walk is None:
         return card(f'<div class="mute">{KEYS}</div>') if not walker.on else ""
     found = walker.walk.fit
-    about = f'<div class="mute">Policy of {escape(found.region.name)}.</div>'
+    about = f'<div class="mute">Policy of {escape(found.name)}.</div>'
     if not found.inside:
         text = escape(found.warning[:1].upper() + found.warning[1:]) + ". It still tries."
         about = _note(plots.WARN, "Not trained for this body", text, "ds-outside")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from draft.learn.policy.policy import Policy
+from draft.learn.policy.reduced import AnyPolicy
 from draft.serving.gamepad import Gamepad
 from draft.studio import cards, fields, live_cards, trend_cards
 from draft.studio.bindings import Element, on, on_key
@@ -49,7 +49,7 @@ class Panel:
         out: Path,
         report: str,
         walk: bool = False,
-        policies: Sequence[Policy] = (),
+        policies: Sequence[AnyPolicy] = (),
     ) -> None:
         """Build the tab.
 

@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from draft.model import Model
+from draft.model import Model, pose
 from draft.studio.skins import Color, Skin, hit, outline, skins
 from draft.values import Array
 
@@ -57,9 +57,7 @@ class RobotMesh:
                 self._shadow = None
             return
         data = self._data
-        data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
-        data.qpos[7:] = angles
-        mujoco.mj_kinematics(model.mujoco, data)
+        pose.put(model.mujoco, data, angles)
         points = np.concatenate([skin.placed(data) for skin in self._skins.values()])
         self.base = -float(points[:, 2].min())
         self.extent = float(np.linalg.norm(np.ptp(points, axis=0)))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import viser
 
-from draft.learn.policy.policy import Policy
+from draft.learn.policy.reduced import AnyPolicy
 from draft.serving.server import Server
 from draft.studio.library import Library, Setting
 from draft.studio.panel import Panel
@@ -34,7 +34,7 @@ class Studio:
         out: Path = Path("out"),
         values: Mapping[str, Setting] | None = None,
         walk: bool = False,
-        policies: Sequence[Policy] = (),
+        policies: Sequence[AnyPolicy] = (),
     ) -> None:
         """Start serving.
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from draft.errors import DraftError
-from draft.learn.policy.policy import Policy
+from draft.learn.policy.reduced import AnyPolicy
 from draft.learn.policy.validity import fit
 from draft.learn.policy.walk import Command, Walk, limiting, on_line, share_of_limit
 from draft.model import Model
@@ -54,7 +54,7 @@ class Walker:
     """
 
     def __init__(
-        self, policies: Sequence[Policy] = (), clock: Callable[[], float] = time.perf_counter
+        self, policies: Sequence[AnyPolicy] = (), clock: Callable[[], float] = time.perf_counter
     ) -> None:
         self._policies, self._clock = policies, clock
         self.walk: Walk | None = None

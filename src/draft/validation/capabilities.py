@@ -133,12 +133,12 @@ def measured(
     threads, settle = cores() if engine.name == NATIVE else 1, seconds * SETTLE / SECONDS
     parts = []
     for one, tests in chosen:
-        one.match(member)
+        one.drive.check(member)
         config = with_conditions(one.plan.config, conditions or Extras())
         task = replace(task_of(one.plan), members=(member,), config=config)
         trial = Trial(task, tests, replicas, seconds, settle, seed=seed)
         where = {"engine": engine.name, "threads": threads}
-        parts.append(evaluate(trial, one.actor(device), device, report, **where)[0])
+        parts.append(evaluate(trial, one.drive.actor(device), device, report, **where)[0])
     worlds = parts[0].with_rows(*parts[1:])
     values = _numbers(worlds, member, walking)
     drawn = _resampled(worlds, member, walking, seed)

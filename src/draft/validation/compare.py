@@ -168,15 +168,18 @@ def _policies(
     policy: str | Path | None, twin: Comparison, notes: list[str]
 ) -> tuple[Source | None, Source | None]:
     """The policy, and that of stairs, if they drive the robot; a note says why not."""
-    source = open_source(policy, blind=True)
     try:
-        source.match(predicted(twin))
+        robot = predicted(twin)
+        source = open_source(policy, blind=True, robot=robot)
+        source.drive.check(robot)
     except DraftError as error:
         if policy is not None:
             raise
         notes.append(f"not measured by roll-outs: {error.problems[0].cause}")
         return None, None
-    return source, source if policy is not None else climbing_family()
+    if policy is not None or source.of_any_legs:
+        return source, source
+    return source, climbing_family()
 
 
 def _surveyed(key: str) -> bool:

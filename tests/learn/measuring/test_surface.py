@@ -21,6 +21,7 @@ from draft.learn.bodies.features import family_features, features  # noqa: E402
 from draft.learn.bodies.legged import legged_robot  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.measuring import learned_metrics as learned  # noqa: E402
+from draft.learn.measuring.drives import ByStructure  # noqa: E402
 from draft.learn.measuring.evaluation_options import BodyRollOuts  # noqa: E402
 from draft.learn.measuring.policies import _of_file, of_run, open_source  # noqa: E402
 from draft.learn.measuring.rollout.evaluate import evaluate  # noqa: E402
@@ -28,7 +29,8 @@ from draft.learn.measuring.rollout.trial import Trial  # noqa: E402
 from draft.learn.measuring.surface import Surface, surface  # noqa: E402
 from draft.learn.measuring.surface_page import page  # noqa: E402
 from draft.learn.measuring.utilisation import Histograms  # noqa: E402
-from draft.learn.policy.policy import FAMILY, open_policy, policy  # noqa: E402
+from draft.learn.policy.policy import ANY, FAMILY, open_policy, policy  # noqa: E402
+from draft.learn.policy.validity import ANY_NAME, FAMILY_NAME  # noqa: E402
 from draft.learn.task.recipes import LAPTOP  # noqa: E402
 from draft.learn.training.run import Plan, Run  # noqa: E402
 from tests.learn.measuring.columns import worlds  # noqa: E402
@@ -75,7 +77,9 @@ def test_every_design_of_the_grid_is_measured_or_refused_with_a_reason(found: Su
 
 
 def test_the_region_of_validity_is_that_of_the_features(run: Run) -> None:
-    region = of_run(run).region
+    drive = of_run(run).drive
+    assert isinstance(drive, ByStructure)
+    region = drive.region
     assert region.holds(family_features(run.plan.members)).all()
     (far,) = open_bodies(["cheetah"], values={"thigh_length": 0.5}).members
     assert not region.holds(features(far)).all()
@@ -170,7 +174,9 @@ def test_the_plane_of_the_pages_is_accepted_and_within_the_policys_region() -> N
     numbers = [axis.ravel() for axis in grid]
     varied = {"thigh_length": numbers[0], "actuators.leg.peak_torque": numbers[1]}
     assert np.all(open_design("quadruped").spec.resolve(None, varied).accepted)
-    assert open_source(None).region.holds(family_features(members)).all()
+    drive = open_source(None).drive
+    assert isinstance(drive, ByStructure)
+    assert drive.region.holds(family_features(members)).all()
 
 
 def test_the_error_of_a_mean_is_that_of_students_t() -> None:
@@ -256,7 +262,20 @@ def test_an_exported_policy_is_measured_with_its_own_physics_and_servos() -> Non
 
 def test_a_policy_drives_no_robot_of_other_joints() -> None:
     with pytest.raises(DraftError, match="does not drive the joints of humanoid"):
-        open_source().match(legged_robot(open_design("humanoid")))
+        open_source().drive.check(legged_robot(open_design("humanoid")))
+
+
+def test_the_policy_of_all_legs_is_opened_for_robots_that_the_family_does_not_drive() -> None:
+    quadruped, humanoid = (legged_robot(open_design(x)) for x in ("quadruped", "humanoid"))
+    assert open_source(robot=quadruped).name == FAMILY_NAME
+    source = open_source(robot=humanoid)
+    assert source.name == ANY_NAME
+    source.drive.check(humanoid)
+    assert source.warning(humanoid) == ""
+    strong = replace(humanoid, peak_torque=tuple(9 * x for x in humanoid.peak_torque))
+    assert "outside the region of the policy of any legs: peak torque" in source.warning(strong)
+    with pytest.raises(DraftError, match="name a robot"):
+        open_source(ANY)
 
 
 def test_the_cost_of_transport_is_electrical_power_per_weight_and_speed() -> None:

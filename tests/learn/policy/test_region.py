@@ -17,7 +17,7 @@ from draft.learn.bodies.features import FEATURES, UNITS, features, readable
 from draft.learn.bodies.legged import REFERENCE_LEG, LeggedRobot, legged_robot
 from draft.learn.policy.policy import FAMILY, designs, open_policy, policy
 from draft.learn.policy.region import Region
-from draft.learn.policy.validity import Fit, fit, train_command
+from draft.learn.policy.validity import ANY_NAME, Fit, fit, train_command
 from draft.learn.policy.walk import Walk
 from draft.model.model import preview
 from draft.values import scalar
@@ -62,7 +62,7 @@ def test_a_body_between_the_ends_of_the_training_gets_the_policy_of_the_family(
     values = {name: low + shares[name] * (high - low) for name, (low, high) in TRAINED.items()}
     found = fitted(values, "run")
     # A corner of the box can lack accepted designs, so a feature can be just outside.
-    assert found.region.name == FAMILY_NAME
+    assert found.name == FAMILY_NAME
     assert all(gap.size < 0.1 for gap in found.outside)
     assert found.policy.file == FAMILY
 
@@ -188,8 +188,29 @@ def test_the_family_walks_bodies_of_its_region(length: float) -> None:
 
 
 def test_a_robot_that_no_policy_drives_names_the_command_that_trains_one() -> None:
+    many = draft.load("humanoid").resolve().build()
     with pytest.raises(DraftError, match=r"no policy .* humanoid: .*\n.*draft train humanoid"):
-        fit(draft.load("humanoid").resolve().build())
+        fit(many, "climb")
+
+
+WEAK = {
+    "hexapod": {"actuators.leg.peak_torque": 1.0},
+    "biped": {"actuators.hip.peak_torque": 5.0},
+    "humanoid": {"actuators.large.peak_torque": 5.0},
+}
+
+
+@pytest.mark.parametrize("robot", WEAK)
+def test_the_policy_of_all_legs_drives_robots_that_no_other_drives(robot: str) -> None:
+    design = draft.load(robot).resolve()
+    found = fit(design.build())
+    assert (found.name, found.outside) == (ANY_NAME, ())
+    assert found.policy.joints == legged_robot(design).joints
+    weak = fit(preview(design.spec.resolve({**design.values, **WEAK[robot]})))
+    assert weak.outside[0].name.startswith("peak torque of the ")
+    assert weak.outside[0].unit == "N m"
+    assert weak.outside[0].value < weak.outside[0].low
+    assert "outside the region of the policy of any legs: peak torque " in weak.warning
 
 
 @pytest.mark.parametrize(
@@ -210,9 +231,9 @@ def test_a_policy_of_ones_own_drives_before_those_that_ship_if_its_joints_fit() 
     own, cheetah = policy("bear", "walk"), preview(SPEC.resolve("cheetah"))
     found = fit(cheetah, policies=[own])
     assert found.policy.file == own.file
-    assert found.region.name == "quadruped:bear"
+    assert found.name == "quadruped:bear"
     # Its file was written before features were part of it: leg length and motors are compared.
     assert "leg length 0.48 m (trained at 0.74)" in found.warning
     assert not found.inside
     other = replace(own, joints=("a", "b"))
-    assert fit(cheetah, policies=[other]).region.name == "quadruped:cheetah"
+    assert fit(cheetah, policies=[other]).name == "quadruped:cheetah"

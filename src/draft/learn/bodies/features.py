@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from draft.learn.bodies.family_fields import family_fields
 from draft.learn.bodies.legged import CLASSES, REFERENCE_LEG, LeggedRobot
 from draft.learn.bodies.payload import model_spec
+from draft.model import pose
 
 GRAVITY = 9.81
 MASS = 30.0  # Approximate mass of a quadruped of scale one [kg].
@@ -101,9 +102,7 @@ def _sizes(
     model: mujoco.MjModel, data: mujoco.MjData, member: LeggedRobot
 ) -> tuple[float, float, float]:
     """Length of the thigh, and distances of the feet along and across in the home pose [m]."""
-    data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
-    data.qpos[7:] = member.home
-    mujoco.mj_kinematics(model, data)
+    pose.put(model, data, member.home)
     hip, knee = (
         np.array([data.xanchor[model.joint(member.joints[leg[i]]).id] for leg in member.leg_joints])
         for i in (1, 2)

@@ -24,6 +24,7 @@ from draft.laws.limits import copper_loss
 from draft.laws.torque_speed import stall_torque
 from draft.learn.bodies.topology import foot_of, mirrored_joints, mirrored_legs, topology, upper_of
 from draft.metrics.speed import top_speed
+from draft.model import pose
 from draft.model.texts import Text, with_template
 from draft.values import Value, scalar
 
@@ -326,9 +327,7 @@ def _height(model: Model, home: Sequence[float], geoms: Sequence[str]) -> float:
     """Trunk's origin above the lowest foot [m]."""
     robot = model.mujoco
     data = mujoco.MjData(robot)
-    data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
-    data.qpos[7:] = home
-    mujoco.mj_kinematics(robot, data)
+    pose.put(robot, data, home)
     return -min(lowest_point(robot, data, name) for name in geoms)
 
 

@@ -29,6 +29,7 @@ from draft.learn.bodies.legged import (
 )
 from draft.learn.bodies.topology import APART
 from draft.metrics.speed import top_speed
+from draft.model import pose
 from draft.model.batch import ModelBatch, build_batch, follows_mujoco
 from draft.model.mjcf import robot_texts
 from draft.values import Array, Value, maximum
@@ -175,9 +176,7 @@ def _heights(batch: ModelBatch, first: LeggedRobot, home: Array) -> list[float]:
     found = []
     for place, angles in enumerate(home):
         batch.write(place, model)
-        data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
-        data.qpos[7:] = angles
-        mujoco.mj_kinematics(model, data)
+        pose.put(model, data, angles)
         found.append(-min(lowest_point(model, data, name) for name in first.foot_geoms))
     return found
 

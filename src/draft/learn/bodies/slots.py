@@ -21,8 +21,9 @@ from draft.errors import DraftError
 from draft.learn.bodies.family_fields import family_fields
 from draft.learn.bodies.features import GRAVITY, MASS
 from draft.learn.bodies.knees import knee_of
-from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.bodies.legged import REFERENCE_LEG, LeggedRobot
 from draft.learn.bodies.payload import model_spec
+from draft.model import pose
 from draft.values import Array
 
 # The joint above the knee whose axis is most parallel with the knee's lifts the leg.
@@ -36,6 +37,8 @@ OF_JOINT = ("presence", "peak torque", "no-load speed", "inertia", "bend")
 OF_LEG = ("hip ahead", "hip aside", "foot ahead", "foot aside", "thigh")
 OF_BODY = ("leg length", "mass", "height", "legs", "sole")
 FEATURES = len(OF_JOINT) * SLOTS + len(OF_LEG) * len(LEGS) + len(OF_BODY)
+# Units of them, by `readable_slots`.
+_UNITS_OF_JOINT, _UNITS_OF_BODY = ("", "N m", "rad/s", "kg m2", "rad"), ("m", "kg", "m", "", "m")
 _UPRIGHT = 0.7  # Vertical part of an axis from which a joint turns the leg about the vertical.
 # A joint of a left leg counts as positive about an axis with a positive part along this.
 _POSITIVE = np.array([1.0, 0.8, 0.5])
@@ -72,11 +75,67 @@ def mirrored_features() -> NDArray[np.intp]:
     )
 
 
+def owned(features: Array) -> NDArray[np.bool_]:
+    """Whether bodies have the joint, the leg or the body that each number is of.
+
+    Args:
+        features: numbers of bodies, shape (..., FEATURES).
+    """
+    joints = features[..., :SLOTS] > 0
+    legs = joints.reshape(*joints.shape[:-1], len(LEGS), len(ROLES)).any(axis=-1)
+    parts = [np.ones_like(joints), *[joints] * (len(OF_JOINT) - 1), *[legs] * len(OF_LEG)]
+    return np.concatenate([*parts, np.ones((*joints.shape[:-1], len(OF_BODY)), bool)], axis=-1)
+
+
+def ranges(features: Array) -> Array:
+    """Ends of each number over the bodies that have what it is of, shape (2, FEATURES).
+
+    Zeros where none has it.
+
+    Args:
+        features: numbers of bodies, shape (bodies, FEATURES).
+    """
+    own = owned(features)
+    low = np.where(own, features, np.inf).min(axis=0)
+    high = np.where(own, features, -np.inf).max(axis=0)
+    return np.where(own.any(axis=0), (low, high), 0.0)
+
+
 def feature_names() -> list[str]:
-    """Name of each feature, such as "peak torque of left front knee"."""
-    joints = [f"{leg} {role}" for leg in LEGS for role in ROLES]
-    named = [(OF_JOINT, joints), (OF_LEG, [f"{leg} leg" for leg in LEGS])]
-    return [f"{what} of {one}" for kinds, of in named for what in kinds for one in of] + [*OF_BODY]
+    """Name of each number."""
+    slots = [f"the {leg} {role}" for leg in LEGS for role in ROLES]
+    return [
+        *(f"{number} of {slot}" for number in OF_JOINT for slot in slots),
+        *(f"{number} of the {leg} leg" for number in OF_LEG for leg in LEGS),
+        *OF_BODY,
+    ]
+
+
+def feature_units() -> list[str]:
+    """Unit of each number, by `readable_slots`."""
+    of_joints = [unit for unit in _UNITS_OF_JOINT for _ in range(SLOTS)]
+    return [*of_joints, *["m"] * (len(OF_LEG) * len(LEGS)), *_UNITS_OF_BODY]
+
+
+def readable_slots(features: Array, member: LeggedRobot) -> Array:
+    """Numbers in `feature_units`, for the leg length and mass of a body, shape (..., FEATURES).
+
+    Args:
+        features: numbers of this body or others, shape (..., FEATURES).
+        member: the body.
+    """
+    length, mass = member.leg_length, member.mass
+    shape = features.shape[:-1]
+    joints = features[..., : len(OF_JOINT) * SLOTS].reshape(*shape, len(OF_JOINT), SLOTS).copy()
+    sizes = (mass * GRAVITY * length, math.sqrt(GRAVITY / length), mass * length**2)
+    joints[..., 1:4, :] = np.exp(joints[..., 1:4, :]) * np.array(sizes)[:, None]
+    joints[..., 4, :] = np.arcsin(np.clip(joints[..., 4, :], -1.0, 1.0))
+    rest = features[..., joints.shape[-2] * SLOTS :] * length
+    body = features[..., -len(OF_BODY) :]
+    rest[..., -5] = np.exp(body[..., 0]) * REFERENCE_LEG
+    rest[..., -4] = np.exp(body[..., 1]) * MASS * member.scale**3
+    rest[..., -2] = body[..., 3] * 4
+    return np.concatenate([joints.reshape(*shape, -1), rest], axis=-1)
 
 
 def slots_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> Slots:
@@ -113,9 +172,7 @@ class _Pose:
     def __init__(self, member: LeggedRobot, model: mujoco.MjModel | None = None) -> None:
         own: mujoco.MjModel = model or model_spec(member).compile()
         data = mujoco.MjData(own)
-        data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
-        data.qpos[7:] = member.home
-        mujoco.mj_kinematics(own, data)
+        pose.put(own, data, member.home)
         ids = [own.joint(name).id for name in member.joints]
         self.member, self.model = member, own
         self.axes, self.anchors = data.xaxis[ids].copy(), data.xanchor[ids].copy()

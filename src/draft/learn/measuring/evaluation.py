@@ -50,15 +50,15 @@ class Guest(Run):
 
         Args:
             reference: the design, as `draft.design.references.open_design` takes it.
-            policy: folder of a run or ONNX file; None for the policy that ships.
+            policy: folder of a run or ONNX file; None for the policy that ships for its legs.
 
         Raises:
             DraftError: there is none of either, or the policy does not drive the design.
         """
         design = open_design(reference)
-        source = open_source(policy, blind=True)
         member = legged_robot(design)
-        source.match(member)
+        source = open_source(policy, blind=True, robot=member)
+        source.drive.check(member)
         config = source.plan.config
         if is_like(source.plan.stage, "push"):
             config = config.with_values({"push.forward": source.forward})
@@ -130,7 +130,7 @@ class Evaluation:
 
         start = time.monotonic()
         if isinstance(self.run, Guest):
-            policy = self.run.source.actor(device)
+            policy = self.run.source.drive.actor(device)
         else:
             policy = trained(self.run, self.request.iteration, device)
         settings = trial(self.run, self.tests, self.request)

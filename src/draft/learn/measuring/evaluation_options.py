@@ -91,7 +91,7 @@ class SeeingPolicy(Settings):
     """Policy that measures many bodies."""
 
     policy: Annotated[
-        str | Path | None, Shown("RUN|FILE.onnx", "the policy of quadrupeds that ships")
+        str | Path | None, Shown("RUN|FILE.onnx", "the policy that ships for its legs")
     ] = None
     """Policy of learned metrics, which observes its design: a run, or an exported one."""
 
@@ -134,7 +134,7 @@ class Target(Settings):
     """Number of levels, spread over each grid, or a list of the levels of one test:
     0.4,1.0,2.0."""
     policy: Annotated[
-        str | Path | None, Shown("RUN|FILE.onnx", "the policy of quadrupeds that ships")
+        str | Path | None, Shown("RUN|FILE.onnx", "the policy that ships for its legs")
     ] = None
     """Policy of the designs: that of a run, or an exported one."""
     checkpoint: Annotated[int | None, Shown("N", "last")] = None

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from draft.design import Design
 from draft.errors import DraftError
 from draft.learn.bodies.designs import joined
-from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import LeggedRobot, check_family, legged_robot
 from draft.learn.bodies.legged_batch import legged_robots
 from draft.learn.measuring.energy import add_energy
@@ -107,16 +106,14 @@ def measure(
             source, members, device, engine, rollouts, report
         )
     ]
-    orders = [source.match(member).joints for member in members]
+    own = source.drive.features(members)
     return Learned(
         **{name: np.array([one.numbers[name] for one in found]) for name in NUMBERS},
         limiting=tuple(one.limiting for one in found),
         inside=np.array(
             [
-                source.region.includes(member, own, order)
-                for member, own, order in zip(
-                    members, family_features(tuple(members)), orders, strict=True
-                )
+                source.drive.includes(member, numbers)
+                for member, numbers in zip(members, own, strict=True)
             ]
         ),
     )
@@ -169,7 +166,7 @@ def roll_outs(
     first = tuple(
         test for test in (upper, replace(SKILL_TESTS[PUSH], levels=KICKS)) if test.name in tests
     )
-    policy = source.actor(device)
+    policy = source.drive.actor(device)
     threads = cores() if engine.name == NATIVE else 1
 
     def rolled_out(
@@ -260,7 +257,7 @@ def walkers(
         if not design.accepted:
             return {}, {}
         alone = legged_robot(design)
-        source.match(alone)
+        source.drive.check(alone)
         return {0: alone}, {}
     accepted = np.flatnonzero(np.broadcast_to(np.asarray(design.accepted), design.count))
     members: dict[int, LeggedRobot] = {}
@@ -270,7 +267,7 @@ def walkers(
         try:
             if isinstance(one, DraftError):
                 raise one
-            source.match(one)
+            source.drive.check(one)
             members[row] = one
         except DraftError as error:
             reasons[row] = error.problems[0].cause

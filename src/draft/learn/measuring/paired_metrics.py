@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.design import Design
-from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.measuring.evaluation import setting
 from draft.learn.measuring.evaluation_options import BodyRollOuts
@@ -101,10 +100,9 @@ def paired(
                     target[:, row] = found.get(one, np.nan)
     if _INSIDE in short:
         inside = np.zeros(count)
-        known = family_features(tuple(members.values())) if members else ()
+        known = source.drive.features([*members.values()]) if members else ()
         for (row, member), own in zip(members.items(), known, strict=True):
-            order = source.match(member).joints
-            inside[row] = source.region.includes(member, own, order)
+            inside[row] = source.drive.includes(member, own)
         values[PREFIX + _INSIDE] = inside
         resampled[PREFIX + _INSIDE] = np.tile(inside, (RESAMPLES, 1))
     return Paired(values, resampled, members, reasons, done)

@@ -62,7 +62,7 @@ def of_policy(
     Args:
         design: one design, or N.
         names: names of metrics in `LEARNED`; None for all.
-        policy: folder of a run or ONNX file; None for the policy of quadrupeds that ships.
+        policy: folder of a run or ONNX file; None for the policy that ships for its legs.
         known: digest that the policy has to have, see `digest`; "" for any.
         rows: which of N designs, increasing; None for all that the filter accepts.
         outside: whether designs outside the policy's region of validity have values too.
@@ -79,14 +79,14 @@ def of_policy(
             extra `learn` is not installed.
     """
     from draft.learn.measuring.learned_metrics import of_designs
-    from draft.learn.measuring.policies import open_source
+    from draft.learn.measuring.policies import source_for
 
     chosen = [find(name) for name in (LEARNED if names is None else names)]
     for metric in chosen:
         if metric.needs != "policy":
             cause = f"'{metric.name}' needs no policy"
             raise DraftError(cause, "use draft.metrics.of_model")
-    source = open_source(policy)
+    source = source_for(policy, design)
     if known and source.digest != known:
         cause = f"the policy of {source.name} has changed since this began"
         remedy = "give a file, which 'draft play' writes of a run: `policy=FILE`"
@@ -113,9 +113,9 @@ def digest(policy: str, design: Design) -> str:
         DraftError: it cannot be read, does not observe its design or does not drive this one.
     """
     from draft.learn.bodies.legged import legged_robot
-    from draft.learn.measuring.policies import open_source
+    from draft.learn.measuring.policies import source_for
     from draft.model.model import preview
 
-    source = open_source(policy or None)
-    source.match(legged_robot(design, preview(design)))
+    source = source_for(policy or None, design)
+    source.drive.check(legged_robot(design, preview(design)))
     return source.digest

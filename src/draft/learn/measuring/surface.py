@@ -21,7 +21,7 @@ from draft.files import new_folder, write
 from draft.learn.measuring import learned_metrics as learned
 from draft.learn.measuring.evaluation_options import SurfaceSettings
 from draft.learn.measuring.learned_metrics import Learned
-from draft.learn.measuring.policies import Source, open_source
+from draft.learn.measuring.policies import Source, source_for
 from draft.settings import by_keyword
 from draft.values import Array
 
@@ -125,7 +125,7 @@ def surface(
         cause = f"a surface needs two ranges, and `vary` has {len(vary)}"
         remedy = "such as `vary` thigh_length=0.2:0.4 actuators.leg.peak_torque=40:120"
         raise DraftError(cause, remedy)
-    source = policy if isinstance(policy, Source) else open_source(policy)
+    source = policy if isinstance(policy, Source) else source_for(policy, design)
     axes = [_rising(axis) for axis in axes_of.parse(design.spec, vary)]
     first, second = axes
     count = math.prod(len(axis.values) or settings.points for axis in axes)

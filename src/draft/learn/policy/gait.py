@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.errors import DraftError
-from draft.learn.policy.policy import Policy
+from draft.learn.bodies.legged import legged_robot
+from draft.learn.policy.reduced import AnyPolicy
 from draft.learn.policy.validity import Fit, fit, train_command
 from draft.learn.policy.walk import Walk
 from draft.model import Model
@@ -39,7 +40,7 @@ class Gait:
         speed: mean speed along the path [m/s].
         note: what lies outside the policy's region of validity; "" for nothing.
         reason: why the robot stands; "" where it walks.
-        remedy: command that trains a policy for it.
+        remedy: command that trains a policy for it; "" where none can be.
     """
 
     positions: Array
@@ -59,7 +60,7 @@ class Gait:
         return not self.reason
 
 
-def record(model: Model, seconds: float = SECONDS, policies: Sequence[Policy] = ()) -> Gait:
+def record(model: Model, seconds: float = SECONDS, policies: Sequence[AnyPolicy] = ()) -> Gait:
     """Record the gait of a robot with the policy that fits it best.
 
     It walks straight ahead at half the largest speed of the policy's training.
@@ -77,14 +78,23 @@ def record(model: Model, seconds: float = SECONDS, policies: Sequence[Policy] = 
         found = fit(model, policies=policies)
         walk = Walk(model, found, (0.5 * found.policy.forward, 0.0, 0.0))
     except DraftError as error:
-        return _standing(error.problems[0].cause, "", remedy)
+        return _standing(error.problems[0].cause, "", remedy if _has_legs(model) else "")
     poses, quaternions, headings = _roll(walk, seconds)
     if walk.first_fall is not None:
         reason = f"it falls after {walk.first_fall:.1f} s"
         if found.inside:
-            reason += f" with the policy of {found.region.name}"
+            reason += f" with the policy of {found.name}"
         return _standing(reason, found.warning, remedy)
     return _looped(found, poses, quaternions, headings, remedy)
+
+
+def _has_legs(model: Model) -> bool:
+    """Whether a policy can be trained for a robot."""
+    try:
+        legged_robot(model.design, model)
+    except DraftError:
+        return False
+    return True
 
 
 def _standing(reason: str, note: str, remedy: str) -> Gait:

@@ -124,11 +124,11 @@ def structure_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> St
     """
     import mujoco
 
+    from draft.model import pose
+
     model = model or mujoco.MjModel.from_xml_string(member.xml)
     data = mujoco.MjData(model)
-    data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
-    data.qpos[7:] = member.home
-    mujoco.mj_kinematics(model, data)
+    pose.put(model, data, member.home)
     ids = [model.joint(name).id for name in member.joints]
     axes, anchors = data.xaxis[ids], data.xanchor[ids]
     feet = np.array([data.site_xpos[model.site(name).id] for name in member.feet])

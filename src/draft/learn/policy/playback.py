@@ -16,8 +16,9 @@ from draft.design.references import find_design
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.policy.controller import Controller
 from draft.learn.policy.play_options import Command, Course, PlaySettings
-from draft.learn.policy.policy import SKILLS, Policy, designs, open_policy, short
+from draft.learn.policy.policy import SKILLS, Policy, designs, short
 from draft.learn.policy.policy import policy as shipped
+from draft.learn.policy.reduced import open_any
 from draft.learn.policy.scenery import dress
 from draft.learn.policy.validity import check_drives, fit
 from draft.learn.task.groups import Episodes, Ground
@@ -285,7 +286,7 @@ def playback(
     if name in designs() and not own:
         chosen = shipped(name, skill or "walk")
     else:
-        model, policies = design.build(), [open_policy(file) for file in own]
+        model, policies = design.build(), [open_any(file) for file in own]
         check_drives(policies, model)
         fitting = fit(model, skill or "walk", policies)
         chosen, warning = fitting.policy, fitting.warning

@@ -25,9 +25,9 @@ DESIGN = "design"  # Term of the observation that holds the features of the desi
 FOLDER = Path(__file__).parents[2] / "robots" / ROBOT / "policies"
 # Policies of all quadrupeds of a range: one that is blind, and one that sees the ground.
 FAMILY, CLIMBING_FAMILY = FOLDER / "family.onnx", FOLDER / "family_climb.onnx"
-# Policy of all legs, which `draft.learn.policy.reduced` opens.
-ANY = FOLDER.parents[1] / "policies" / "any.onnx"
 FAMILIES = {"walk": FAMILY, "run": FAMILY, "push": FAMILY, "climb": CLIMBING_FAMILY}
+# The policy of all legs; see `draft.learn.policy.reduced`.
+ANY = FOLDER.parents[1] / "policies" / "any.onnx"
 Array = NDArray[np.float64]
 
 
@@ -158,12 +158,6 @@ class Policy:
 def policy(design: str, skill: str = "walk") -> Policy:
     """Load the policy of a shipped design.
 
-        >>> walk = draft.policy("cheetah")
-        >>> walk
-        Policy('quadruped:cheetah', stage base, 48 observations, 12 actions)
-        >>> walk(np.zeros(48)).shape
-        (12,)
-
     Args:
         design: name of the design, such as "cheetah".
         skill: "walk", "run", "climb" or "push".
@@ -171,8 +165,7 @@ def policy(design: str, skill: str = "walk") -> Policy:
     Raises:
         DraftError: there is no such design or skill.
     """
-    if skill not in SKILLS:
-        raise DraftError(f"there is no skill '{skill}'", suggest(skill, SKILLS, "skills"))
+    check_skill(skill)
     name, shipped = short(design), designs()
     if name not in shipped:
         remedy = suggest(name, shipped, "designs with policies")
@@ -184,6 +177,16 @@ def policy(design: str, skill: str = "walk") -> Policy:
         cause = f"no policy of '{name}' that can {skill} is shipped"
         raise DraftError(cause, f"skills of {name}: {', '.join(known)}")
     return open_policy(file)
+
+
+def check_skill(skill: str) -> None:
+    """Check the name of a skill.
+
+    Raises:
+        DraftError: there is no such skill.
+    """
+    if skill not in SKILLS:
+        raise DraftError(f"there is no skill '{skill}'", suggest(skill, SKILLS, "skills"))
 
 
 def short(design: str) -> str:
@@ -206,7 +209,19 @@ def open_policy(path: str | Path) -> Policy:
         DraftError: it cannot be read, or was written by another tool.
     """
     file = Path(path)
-    network = read(file)
+    return with_network(file, read(file))
+
+
+def with_network(file: Path, network: Network) -> Policy:
+    """Return the policy of a network that `draft play` wrote.
+
+    Args:
+        file: file of the network.
+        network: the network, with its metadata.
+
+    Raises:
+        DraftError: the metadata are not those of a policy.
+    """
     try:
         return _policy(file, network)
     except (KeyError, ValueError) as error:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import mujoco
@@ -20,12 +21,24 @@ from draft.errors import DraftError
 from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.bodies.padding import places, size, starts, units
-from draft.learn.bodies.slots import FEATURES, SLOTS, Slots, describe
+from draft.learn.bodies.slots import (
+    FEATURES,
+    SLOTS,
+    Slots,
+    describe,
+    feature_names,
+    feature_units,
+    owned,
+    readable_slots,
+)
 from draft.learn.policy.matching import structure_of
 from draft.learn.policy.onnx_file import Network, of_layers, read
-from draft.learn.policy.policy import Policy
+from draft.learn.policy.policy import ANY, Policy, with_network
+from draft.learn.policy.region import SAME, Departure
 from draft.values import Array
 
+_REMEDY = "use the one that ships, or one of 'draft train any'"
+_NARROW = 0.1  # Width of a range of features below which it counts as this wide.
 LAYOUT = "slots"  # Value of the metadata's key `layout` of such a policy.
 
 
@@ -36,24 +49,56 @@ class LegsPolicy:
     Attributes:
         file: file that it was read from.
         network: network from padded observations to actions of the slots.
-        low, high: ends of each feature of the bodies of the training, shape (FEATURES,).
+        known: ends of each feature of the bodies of the training, by number of legs, each of
+            shape (2, FEATURES).
         forward: largest |vx| that was commanded, per sqrt(g L), by number of legs.
     """
 
     file: Path
     network: Network
-    low: Array
-    high: Array
+    known: Mapping[int, Array]
     forward: Mapping[int, float]
 
-    def outside(self, member: LeggedRobot, model: mujoco.MjModel | None = None) -> Array:
-        """How far the numbers of a robot lie outside those of the training, shape (FEATURES,).
+    def ends(self, legs: int) -> tuple[Array, Array]:
+        """Lower and upper ends of the features of bodies with this number of legs.
 
-        Zero inside; else the distance to the nearer end, per the width of the range or one tenth,
-        whichever is larger.
+        Of all bodies where none had as many.
         """
-        _, own = describe(member, model)
-        return (own - np.clip(own, self.low, self.high)) / np.maximum(self.high - self.low, 0.1)
+        if legs in self.known:
+            low, high = self.known[legs]
+            return low, high
+        every = np.array([*self.known.values()])
+        return every[:, 0].min(axis=0), every[:, 1].max(axis=0)
+
+    def forward_for(self, member: LeggedRobot) -> float:
+        """Largest |vx| that was commanded, at the size of a robot [m/s]."""
+        share = self.forward.get(len(member.feet), min(self.forward.values()))
+        return share * math.sqrt(GRAVITY * member.leg_length)
+
+    def nearest(self, own: Array, legs: int) -> Array:
+        """Features of a robot as the nearest of the training, shape (FEATURES,)."""
+        return np.where(owned(own), np.clip(own, *self.ends(legs)), own)
+
+    def departures(self, member: LeggedRobot, own: Array) -> tuple[Departure, ...]:
+        """What of a robot lies outside the training, the farthest first.
+
+        The measure is the distance to the nearer end, per the width of the range or one tenth,
+        whichever is larger.
+
+        Args:
+            member: the robot.
+            own: its features, shape (FEATURES,).
+        """
+        low, high = self.ends(len(member.feet))
+        width = np.maximum(high - low, _NARROW)
+        distance = np.abs(own - np.clip(own, low, high)) / width * owned(own)
+        shown = readable_slots(np.array((own, low, high)), member).T.tolist()
+        names, units = feature_names(), feature_units()
+        found = []
+        for i in np.argsort(-distance, kind="stable")[: np.count_nonzero(distance > SAME)]:
+            value, least, most = shown[i]
+            found.append(Departure(names[i], value, least, most, units[i]))
+        return tuple(found)
 
     def of_robot(self, member: LeggedRobot, model: mujoco.MjModel | None = None) -> Policy:
         """Return the policy of one robot; its numbers count as the nearest of the training.
@@ -74,12 +119,10 @@ class LegsPolicy:
         )
         peak = np.array(member.peak_torque)
         timestep = float(texts["physics_timestep"])
-        number = len(member.feet)
-        forward = self.forward.get(number, min(self.forward.values()))
         return Policy(
             file=self.file,
             network=self._network(
-                slots, member.leg_length, np.clip(own, self.low, self.high), terms
+                slots, member.leg_length, self.nearest(own, len(member.feet)), terms
             ),
             design=member.name,
             stage=texts["stage"],
@@ -102,7 +145,7 @@ class LegsPolicy:
             terms=terms,
             scan_points=np.zeros((0, 2)),
             scan_range=1.0,
-            forward=forward * math.sqrt(GRAVITY * member.leg_length),
+            forward=self.forward_for(member),
             features=np.zeros(0),
             known=np.zeros((2, 0)),
             leg_length=member.leg_length,
@@ -140,6 +183,31 @@ class LegsPolicy:
         )
 
 
+AnyPolicy = Policy | LegsPolicy
+
+
+@lru_cache(maxsize=1)
+def any_legs() -> LegsPolicy:
+    """The policy of all legs that ships."""
+    return open_legs_policy(ANY)
+
+
+def open_any(path: str | Path) -> AnyPolicy:
+    """Read a policy of one kind of robot or of all legs.
+
+    Args:
+        path: ONNX file.
+
+    Raises:
+        DraftError: it cannot be read, or was written by another tool.
+    """
+    file = Path(path)
+    network = read(file)
+    if network.metadata.get("layout") == LAYOUT:
+        return _legs(file, network)
+    return with_network(file, network)
+
+
 def open_legs_policy(path: str | Path) -> LegsPolicy:
     """Read a policy of all legs.
 
@@ -149,27 +217,35 @@ def open_legs_policy(path: str | Path) -> LegsPolicy:
     Raises:
         DraftError: it cannot be read, or is another kind of policy.
     """
-    file = Path(path)
-    network = read(file)
+    found = open_any(path)
+    if isinstance(found, LegsPolicy):
+        return found
+    cause = f"{path} is no policy of all legs: it drives the joints of one kind of robot"
+    raise DraftError(cause, _REMEDY)
+
+
+def _legs(file: Path, network: Network) -> LegsPolicy:
     texts = network.metadata
     try:
-        if texts.get("layout") != LAYOUT:
-            raise ValueError("it drives the joints of one kind of robot")
-        low, high = (
-            np.array(texts[f"features_{end}"].split(","), float) for end in ("low", "high")
-        )
-        if network.size != size("actor") or len(low) != FEATURES or len(high) != FEATURES:
+        pairs = (pair.split(";") for pair in texts["forward"].split(","))
+        forward = {int(legs): float(speed) for legs, speed in pairs}
+        known = {
+            legs: np.array(texts[f"features_of_{legs}"].split(","), float).reshape(2, -1)
+            for legs in forward
+        }
+        counts = {values.shape[1] for values in known.values()}
+        if network.size != size("actor") or counts != {FEATURES}:
             raise ValueError(f"it has {network.size} inputs, and {size('actor')} are known")
         if len(network.layers()[2][-1][1]) != SLOTS:
             raise ValueError(f"it has not {SLOTS} outputs")
-        if not all(np.isfinite(values).all() for values in (low, high)):
+        mean, divisor, layers = network.layers()
+        arrays = [mean, divisor, *(one for layer in layers for one in layer), *known.values()]
+        if not all(np.isfinite(values).all() for values in arrays):
             raise ValueError("its numbers are not finite")
-        pairs = (pair.split(";") for pair in texts["forward"].split(","))
-        forward = {int(legs): float(speed) for legs, speed in pairs}
     except (KeyError, ValueError) as error:
         cause = f"{file} is no policy of all legs: {str(error).strip(chr(39))}"
-        raise DraftError(cause, "use the one that ships, or one of 'draft train any'") from None
-    return LegsPolicy(file, network, low, high, forward)
+        raise DraftError(cause, _REMEDY) from None
+    return LegsPolicy(file, network, known, forward)
 
 
 def _ends(text: str) -> tuple[float, float]:

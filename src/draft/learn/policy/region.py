@@ -43,7 +43,8 @@ class Departure:
     def __str__(self) -> str:
         ends = dict.fromkeys((brief(self.low), brief(self.high)))
         known = " to ".join(ends) + " for its size" * self.for_size
-        return f"{self.name} {brief(self.value)} {self.unit} (trained at {known})"
+        value = f"{brief(self.value)} {self.unit}".rstrip()
+        return f"{self.name} {value} (trained at {known})"
 
     @property
     def size(self) -> float:

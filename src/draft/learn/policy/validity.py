@@ -22,9 +22,11 @@ from draft.design import Design
 from draft.errors import DraftError
 from draft.learn.bodies.features import features
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.bodies.slots import describe, slots_of
 from draft.learn.policy import policy as shipped
 from draft.learn.policy.matching import Match, match, match_of, structure_of, trained_structure
 from draft.learn.policy.policy import Policy
+from draft.learn.policy.reduced import AnyPolicy, LegsPolicy, any_legs
 from draft.learn.policy.region import SAME, Departure, Region, departures, limited, sentence
 from draft.learn.task.constants import scaled
 from draft.learn.task.recipes import LAPTOP
@@ -32,10 +34,11 @@ from draft.model import Model
 from draft.spec import load
 from draft.values import scalar
 
-FAMILY_NAME = f"the family of {shipped.ROBOT}s"
+FAMILY_NAME, ANY_NAME = f"the family of {shipped.ROBOT}s", "any legs"
 # Factor by which a design may have more friction than the training, where motors lost about 1 % of
 # their torque to it; the cheetah then still walks at five sixths of its speed.
 _FAR = 5.0
+_OF_ANY_LEGS = ("walk", "run", "push")  # Skills of the policy of all legs.
 
 
 @dataclass(frozen=True)
@@ -44,13 +47,13 @@ class Fit:
 
     Attributes:
         policy: the policy with the names and numbers of the design's joints and motors.
-        region: region of validity of the policy.
+        name: what its region of validity is called: a design, a family or any legs.
         outside: numbers of the design outside the region; none inside it.
         height: trunk's origin above the ground in the home pose [m].
     """
 
     policy: Policy
-    region: Region
+    name: str
     outside: tuple[Departure, ...]
     height: float
 
@@ -62,11 +65,13 @@ class Fit:
     @cached_property
     def warning(self) -> str:
         """Sentence that says what lies outside the region; "" inside it."""
-        return sentence(self.region.name, self.outside)
+        return sentence(self.name, self.outside)
 
 
-def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> Fit:
+def fit(model: Model, skill: str = "walk", policies: Sequence[AnyPolicy] = ()) -> Fit:
     """Return the policy whose region is nearest to a design.
+
+    The policy of all legs drives robots that no other one does. It has not learnt to climb.
 
     Args:
         model: the robot; the filter may have refused it.
@@ -87,9 +92,14 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> F
     own = structure_of(member, model.mujoco)
     seen = features(member, model.mujoco)
     found: list[tuple[Policy, Region, Match, tuple[Departure, ...]]] = []
+    legs = [(one, str(one.file)) for one in policies if isinstance(one, LegsPolicy)]
+    given = [
+        (one, Region.of(_title(one), one.known, one))
+        for one in policies
+        if not isinstance(one, LegsPolicy)
+    ]
     reason = ""
-    given = [(one, Region.of(_title(one), one.known, one)) for one in policies]
-    for known in (given, _regions(skill)):
+    for known in (given, () if legs else _regions(skill)):
         for one, region in () if found else known:
             chosen = match(one.joints, trained_structure(one), member.joints, own)
             if isinstance(chosen, str):
@@ -98,18 +108,42 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> F
             outside = *_outside(one, region, member, seen, chosen), *_rubbing(region, design)
             found.append((one, region, chosen, outside))
     if not found:
-        raise DraftError(f"{cause}: {reason}", f"train one: {train_command(design)}")
+        if not legs and skill in _OF_ANY_LEGS:
+            legs = [(any_legs(), ANY_NAME)]
+        try:
+            return _by_slots(*legs[0], model, member, skill)
+        except (DraftError, IndexError) as error:
+            if isinstance(error, DraftError):
+                reason = error.problems[0].cause
+            remedy = f"train one: {train_command(design)}"
+            raise DraftError(f"{cause}: {reason}", remedy) from None
     policy, region, chosen, outside = min(found, key=lambda one: sum(gap.size for gap in one[3]))
     adapted = _adapted(policy, member, seen, chosen)
-    if skill == "walk" and not any(
-        policy is one for one in policies
-    ):  # The family's policy can also run.
-        slow = scaled(LAPTOP.config.commands, "forward").at(member.scale)
-        adapted = replace(adapted, forward=min(policy.forward, slow))
-    return Fit(adapted, region, outside, member.height)
+    # The family's policy can also run.
+    if skill == "walk" and not any(policy is one for one in policies):
+        adapted = _slow(adapted, member)
+    return Fit(adapted, region.name, outside, member.height)
 
 
-def check_drives(policies: Sequence[Policy], model: Model) -> None:
+def _by_slots(legs: LegsPolicy, name: str, model: Model, member: LeggedRobot, skill: str) -> Fit:
+    """The policy of all legs for a robot.
+
+    Raises:
+        DraftError: a leg has more joints than there are slots.
+    """
+    policy, own = legs.of_robot(member, model.mujoco), describe(member, model.mujoco)[1]
+    if skill == "walk":
+        policy = _slow(policy, member)
+    return Fit(policy, name, legs.departures(member, own), member.height)
+
+
+def _slow(policy: Policy, member: LeggedRobot) -> Policy:
+    """Policy that is asked to walk."""
+    slow = scaled(LAPTOP.config.commands, "forward").at(member.scale)
+    return replace(policy, forward=min(policy.forward, slow))
+
+
+def check_drives(policies: Sequence[AnyPolicy], model: Model) -> None:
     """Check that policies of one's own drive a robot.
 
     Args:
@@ -124,6 +158,9 @@ def check_drives(policies: Sequence[Policy], model: Model) -> None:
     member = legged_robot(model.design, model)
     own = structure_of(member, model.mujoco)
     for one in policies:
+        if isinstance(one, LegsPolicy):
+            slots_of(member, model.mujoco)
+            continue
         reason = match(one.joints, trained_structure(one), member.joints, own)
         if isinstance(reason, str):
             cause = f"the policy {one.file} does not drive the joints of {model.design.reference}"

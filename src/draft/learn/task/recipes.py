@@ -127,9 +127,10 @@ ANY = Recipe(
     "any",
     {
         **LAPTOP.changes,
-        "learning.environments": Change(1024, "some 200 of each topology"),
-        "learning.iterations_any": Change(2500, "60 million steps"),
-        "learning.entropy": Change(0.005, "its sum over the joints is that of twelve for most"),
+        "learning.environments": Change(256, "more worlds learn less from each step"),
+        "learning.iterations_any": Change(3500, "21.5 million steps"),
+        "learning.kl": Change(0.03, "it is a sum over up to 29 joints"),
+        "learning.entropy": Change(0.002, "it is a sum over up to 29 joints"),
         "velocity.forward": Change(2.17, "sqrt(g L)"),
         "velocity.sideways": Change(0.5, "0.23 sqrt(g L)"),
         "velocity.turn": Change(1.5, "0.33 sqrt(g / L)"),

@@ -13,7 +13,7 @@ from draft.extras import own_version
 from draft.files import write
 from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.legged import by_topology, kind_of
-from draft.learn.bodies.slots import slot_features
+from draft.learn.bodies.slots import ranges, slot_features
 from draft.learn.policy.reduced import LAYOUT
 from draft.learn.training.ppo.checkpoint import read_checkpoint
 from draft.learn.training.progress import FASTEST, PROGRESS
@@ -74,9 +74,12 @@ def export_legs(run: Run, path: Path, iteration: int | None = None) -> None:
 
 
 def _metadata(run: Run, iteration: int) -> dict[str, str]:
-    plan, groups = run.plan, by_topology(run.plan.members)
+    plan = run.plan
     config = plan.config
-    known = np.array([one for members in groups for one in slot_features(members)])
+    known: dict[int, list[tuple[float, ...]]] = {}
+    for members in by_topology(plan.members):
+        known.setdefault(len(members[0].feet), []).extend(slot_features(members))
+    ends = {legs: ranges(np.array(values)) for legs, values in known.items()}
     step = config.physics.timestep
     return {
         "layout": LAYOUT,
@@ -90,8 +93,7 @@ def _metadata(run: Run, iteration: int) -> dict[str, str]:
         "action_scale": f"{config.actuation.action_scale:.9g}",
         "stiffness": f"{config.actuation.stiffness:.9g}",
         "damping": f"{config.actuation.damping:.9g}",
-        "features_low": _row(known.min(axis=0)),
-        "features_high": _row(known.max(axis=0)),
+        **{f"features_of_{legs}": _row(values.ravel()) for legs, values in ends.items()},
         "forward": _forward(run, iteration),
         "draft_version": own_version(),
     }
