@@ -20,6 +20,7 @@ from draft.learn.task.constants import Scaled, scaled
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnvCfg
 
+    from draft.learn.task.groups import Velocity
     from draft.learn.task.mdp.commands import VelocityCommandCfg
     from draft.learn.task.world.task import Task
 
@@ -138,14 +139,19 @@ def any_legs(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
     terms["action_rate"].params["ramp"] = numbers.action_rate_ramp
     for name in ("action_rate", "joint_limits"):
         terms[name].weight *= share
-    if len(member.feet) == 2:
-        forward, sideways = (Scaled(_ON_TWO_LEGS * most) for most in (v.forward, v.sideways))
-        command.set_largest(forward, sideways, Scaled(v.turn), task)
+    command.set_largest(*largest_of_any(v, len(member.feet)), task)
     if v.progress:
         gate = scaled(numbers, "clearance_gate")
         terms["progress"] = RewardTermCfg(
             func=rewards.progress, weight=v.progress, params={"gate": gate}
         )
+
+
+def largest_of_any(numbers: Velocity, legs: int) -> tuple[Scaled, Scaled, Scaled]:
+    """Largest |vx|, |vy| and |wz| of stage `any` for robots on a number of legs."""
+    share = _ON_TWO_LEGS if legs == 2 else 1.0
+    forward, sideways = (Scaled(share * x, 0.5) for x in (numbers.forward, numbers.sideways))
+    return forward, sideways, Scaled(numbers.turn, -0.5)
 
 
 def terrain(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
