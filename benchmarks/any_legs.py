@@ -37,6 +37,7 @@ from benchmarks.roll_outs import (
     Rolled,
     bar,
     bars_table,
+    distance,
     number,
     record_of,
     rolled_out,
@@ -171,10 +172,9 @@ def _kind(job: Job) -> dict[str, Any]:
         kinds = with_untrained(Path(folder))
         members = generate_kind(job.kind, job.count, job.seed, kinds).members
     legs = len(members[0].feet)
-    policies = [job.legs.of_robot(member) for member in members]
     options = {"replicas": job.replicas, "seconds": job.seconds, "seed": job.seed}
-    found = rolled_out(members, policies, cases_of(legs), **options)
-    outside = [float(np.abs(job.legs.outside(member)).max()) for member in members]
+    found = rolled_out(job.legs, members, cases_of(legs), **options)
+    outside = [distance(job.legs, member) for member in members]
     return {
         "kind": job.kind,
         "trained": job.kind in KINDS,
@@ -216,9 +216,8 @@ def humanoid_speed(
 ) -> dict[str, Any]:
     """Largest speed of a robot over the commands at which four of five stay up [m/s]."""
     cases = [Case.ahead(speed) for speed in SPEEDS]
-    policy = legs.of_robot(member)
     options = {"replicas": 2 * replicas, "seconds": seconds, "threads": cores()}
-    found = rolled_out([member], [policy], cases, **options)
+    found = rolled_out(legs, [member], cases, **options)
     root = math.sqrt(GRAVITY * member.leg_length)
     speeds = [found.reached(i) if found.up(i) >= SURVIVAL else None for i in range(len(cases))]
     known = [speed * root for speed in speeds if speed is not None]

@@ -25,19 +25,16 @@ from draft.errors import DraftError
 from draft.files import write
 from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.bodies.slots import describe
 from draft.learn.engine.machine import NATIVE
 from draft.learn.measuring.policies import config_of
 from draft.learn.measuring.utilisation import QUANTITIES, limiting, percentile
-from draft.learn.policy.policy import Policy
 from draft.learn.policy.reduced import LegsPolicy
 from draft.learn.silence import quiet
 from draft.learn.training.run import file_digest
 from draft.values import Array, brief
 
 if TYPE_CHECKING:
-    from mjlab.envs import ManagerBasedRlEnv
-
-    from draft.learn.measuring.rollout.evaluate import Policy as Actor
     from draft.learn.measuring.rollout.trial import Layout
 
 SECONDS, SETTLE = 12.0, 3.0  # Of a roll-out, and its part that is not measured [s].
@@ -120,8 +117,8 @@ class Rolled:
 
 
 def rolled_out(
+    legs: LegsPolicy,
     members: Sequence[LeggedRobot],
-    policies: Sequence[Policy],
     cases: Sequence[Case],
     *,
     replicas: int,
@@ -132,8 +129,8 @@ def rolled_out(
     """Roll out robots of one topology side by side, natively.
 
     Args:
+        legs: the policy.
         members: the robots.
-        policies: policy of each, from `LegsPolicy.of_robot`.
         cases: what is asked.
         replicas: roll-outs of each robot at each case.
         seconds: duration of a roll-out [s].
@@ -141,11 +138,12 @@ def rolled_out(
         threads: threads of MuJoCo.
 
     Raises:
-        DraftError: a policy observes other things than the environment gives.
+        DraftError: a leg of a robot has more joints than the policy drives.
     """
     import torch
 
     from draft.learn.engine.worlds.simulate import make
+    from draft.learn.measuring.rollout.by_slots import by_slots
     from draft.learn.measuring.rollout.evaluate import roll_out
     from draft.learn.measuring.rollout.trial import Trial
     from draft.learn.measuring.rollout.trial_env import env_cfg
@@ -154,8 +152,9 @@ def rolled_out(
     from draft.learn.task.world.task import Task
 
     torch.set_num_threads(1)
-    first = policies[0]
-    task = Task(tuple(members), first.stage, config_of(first), "flat", see_ground=False, seed=seed)
+    numbers = config_of(legs.of_robot(members[0]))
+    stage = legs.network.metadata["stage"]
+    task = Task(tuple(members), stage, numbers, "flat", see_ground=False, seed=seed)
     settle = seconds * SETTLE / SECONDS
     trial = Trial(task, (), replicas * len(members), seconds, settle, seed=seed)
     sizes = np.array([_sizes(member) for member in members])  # (robots, 3)
@@ -182,7 +181,7 @@ def rolled_out(
             sums.add_(torch.cat((linear[:, :2], angular[:, 2:]), dim=1))
             errors.add_((linear[:, :2] - held[:, :2]).norm(dim=1))
 
-        measures = roll_out(env, _actor(env, policies), trial, sample)
+        measures = roll_out(env, by_slots(legs, "cpu")(env), trial, sample)
         fell = measures.fell.numpy().reshape(worlds)
         counts, _ = measures.samples(replicas, len(members))
     finally:
@@ -224,24 +223,6 @@ def _layout(
     )
 
 
-def _actor(env: ManagerBasedRlEnv, policies: Sequence[Policy]) -> Actor:
-    """Policies of the robots, which alternate from world to world."""
-    import torch
-
-    from draft.learn.measuring.rollout.evaluate import exported
-
-    own = [exported(policy, "cpu")(env) for policy in policies]
-    shape = env.num_envs, env.action_manager.total_action_dim
-
-    def act(seen: Any) -> torch.Tensor:
-        found = torch.zeros(shape)
-        for k, one in enumerate(own):
-            found[k :: len(own)] = one(seen[k :: len(own)])
-        return found
-
-    return act
-
-
 def _shares(classes: Sequence[str], counts: Array) -> Mapping[str, Mapping[str, float | None]]:
     """95th percentiles of the joint classes; those of no samples are None."""
     return {
@@ -258,6 +239,11 @@ def _mean(values: Array, fell: Array) -> float | None:
 def rounded(value: float | None, digits: int = 3) -> float | None:
     """A number as the results have it; None stays None."""
     return None if value is None or math.isnan(value) else round(value, digits)
+
+
+def distance(legs: LegsPolicy, member: LeggedRobot) -> float:
+    """How far a robot lies outside the region of the policy; 0 inside."""
+    return float(legs.distances(describe(member)[1], len(member.feet)).max())
 
 
 def record_of(legs: LegsPolicy) -> dict[str, Any]:

@@ -19,7 +19,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -31,6 +30,7 @@ from benchmarks.roll_outs import (
     Case,
     bar,
     bars_table,
+    distance,
     number,
     record_of,
     rolled_out,
@@ -41,7 +41,7 @@ from draft import parallel
 from draft.errors import DraftError, counted
 from draft.laws.survey import read
 from draft.learn.bodies.legged import LeggedRobot
-from draft.learn.bodies.slots import feature_names
+from draft.learn.bodies.slots import describe
 from draft.learn.engine.machine import cores
 from draft.learn.policy.policy import ANY
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy
@@ -57,7 +57,7 @@ FOUR, TWO = "quadrupeds", "bipeds and humanoids"
 AT = {FOUR: 0.5, TWO: 0.25}  # Commands of the bars [sqrt(g L)].
 WALK = {FOUR: 0.9, TWO: 0.6}  # Shares of machines that are to walk.
 _KINDS = (".urdf", ".xml")
-_NAMED = 2  # Features outside the region that are named.
+_NAMED = 2  # Numbers outside the region that are named.
 
 
 @dataclass(frozen=True)
@@ -175,11 +175,11 @@ def measured(job: Job) -> dict[str, Any]:
         key = entry.key if any(one.robot == entry.key for one in read()) else ""
         twin = compare_twin(entry.file, poses=2, key=key)
         member = by_maker(twin)
-        policy = legs.of_robot(member)
+        far = outside(legs, member)
     except DraftError as error:
         return row | {"reason": " ".join(error.problems[0].cause.split())}
     cases = cases_of(len(member.feet))
-    found = rolled_out([member], [policy], cases, replicas=job.replicas, seconds=job.seconds)
+    found = rolled_out(legs, [member], cases, replicas=job.replicas, seconds=job.seconds)
     fastest = max((i for i in range(4) if found.up(i) >= 0.5), default=None)
     limit = None if fastest is None else found.limit(fastest)
     if limit is not None and fastest is not None:
@@ -191,20 +191,16 @@ def measured(job: Job) -> dict[str, Any]:
         "mass": round(member.mass, 3),
         "cases": cases_record(found),
         "limit": limit,
-        **outside(legs, member),
+        **far,
         "notes": notes(twin),
     }
 
 
 def outside(legs: LegsPolicy, member: LeggedRobot) -> dict[str, Any]:
-    """How far a robot lies outside the region, and its farthest features."""
-    far = legs.outside(member)
-    order = np.argsort(-np.abs(far))[:_NAMED]
-    names = feature_names()
-    return {
-        "outside": round(float(np.abs(far).max()), 3),
-        "farthest": [f"{names[i]} {far[i]:+.2f}" for i in order if abs(far[i]) > 5e-3],
-    }
+    """How far a robot lies outside the region, and its farthest numbers."""
+    found = legs.departures(member, describe(member)[1])
+    farthest = [str(one) for one in found[:_NAMED]]
+    return {"outside": round(distance(legs, member), 3), "farthest": farthest}
 
 
 def notes(twin: Comparison) -> list[str]:

@@ -263,7 +263,7 @@ def _failures(real: Mapping[str, Any]) -> list[str]:
             error = "" if one["error"] is None else f", error {one['error']:.2f}"
             words = f"- {row['robot']}, at {at:g}: {number(one['up'], '%')} up{error}"
             if row["farthest"]:
-                words += f"; outside the region: {', '.join(row['farthest'])}"
+                words += f"; outside the region: {'; '.join(row['farthest'])}"
             cause = CAUSES.get(row["robot"])
             lines.append(f"{words}. {cause}" if cause else f"{words}.")
     missing = [row for row in real["robots"] if "reason" in row and not row["again"]]

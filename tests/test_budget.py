@@ -24,7 +24,7 @@ BUDGET = {
     "fitting": 3_710,
     "imports": 6_250,
     "laws": 1_910,
-    "learn": 18_670,
+    "learn": 18_650,
     "metrics": 1_910,
     "model": 3_900,
     "reporting": 1_820,

@@ -16,7 +16,7 @@ from benchmarks.roll_outs import Case, rolled_out
 from draft.learn.bodies.generated import KINDS, generate_kind
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.bodies.padding import size
-from draft.learn.bodies.slots import FEATURES, SLOTS, feature_names, slots_of
+from draft.learn.bodies.slots import FEATURES, SLOTS, slots_of
 from draft.learn.policy.onnx_file import of_layers
 from draft.learn.policy.reduced import LAYOUT, LegsPolicy
 
@@ -44,15 +44,15 @@ def legs() -> LegsPolicy:
         (np.zeros((SLOTS, 4)), np.zeros(SLOTS)),
     ]
     network = of_layers(np.zeros(count), np.ones(count), layers, texts)
-    ends = np.zeros(FEATURES), np.ones(FEATURES)
-    return LegsPolicy(Path("any.onnx"), network, *ends, {2: 0.5, 4: 1.0, 6: 1.0})
+    ends = np.array((np.zeros(FEATURES), np.ones(FEATURES)))
+    forward = {2: 0.5, 4: 1.0, 6: 1.0}
+    return LegsPolicy(Path("any.onnx"), network, dict.fromkeys(forward, ends), forward)
 
 
 def test_robots_of_other_sizes_are_asked_by_their_own(legs: LegsPolicy) -> None:
     members = generate_kind("quadruped", 2, seed=5).members
-    policies = [legs.of_robot(member) for member in members]
     cases = (Case.ahead(0.5), Case("sideways", (0.0, 0.2, 0.0)), Case("turn", (0.0, 0.0, 0.3)))
-    found = rolled_out(members, policies, cases, replicas=2, seconds=1.0)
+    found = rolled_out(legs, members, cases, replicas=2, seconds=1.0)
     assert found.fell.shape == (3, 2, 2)
     assert found.up(0) == 1.0
     for i, error in enumerate((0.5, 0.2, 0.0)):
@@ -67,8 +67,7 @@ def test_robots_of_other_sizes_are_asked_by_their_own(legs: LegsPolicy) -> None:
 def test_a_strong_push_makes_robots_fall(legs: LegsPolicy) -> None:
     member = legged_robot(draft.load("quadruped").resolve())
     cases = (Case("stand", (0.0, 0.0, 0.0)), Case("push", (0.0, 0.0, 0.0), 5.0))
-    policies = [legs.of_robot(member)]
-    found = rolled_out([member], policies, cases, replicas=4, seconds=2.0)
+    found = rolled_out(legs, [member], cases, replicas=4, seconds=2.0)
     assert found.up(0) > found.up(1)
     assert not found.fell[0].any()
 
@@ -107,10 +106,3 @@ def test_kinds_that_are_never_trained_can_be_drawn(tmp_path: Path) -> None:
 def test_each_kind_of_the_generator_has_a_bar() -> None:
     named = [name for names, *_ in any_legs.GROUPS.values() for name in names]
     assert sorted(named) == sorted(KINDS)
-
-
-def test_features_have_names() -> None:
-    names = feature_names()
-    assert len(names) == len(set(names)) == FEATURES
-    assert names[0] == "presence of left front yaw"
-    assert names[-1] == "sole"
