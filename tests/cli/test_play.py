@@ -8,10 +8,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import draft
-from draft.learn.policy.policy import designs
+from draft.learn.policy.policy import designs, open_policy
 from draft.learn.training.run import Run, create
 from draft.model import picture
 from tests.commands import Command
@@ -90,7 +91,7 @@ NO_RUN = "is neither a run of 'draft train' nor a design"
         ("run --kick 2", "--kick is for designs"),
         ("run --policy x.onnx", "--policy is for designs"),
         # The policy of a family is no file for another robot.
-        ("quadruped --onnx", "--onnx is for runs and for bear, "),
+        ("quadruped --onnx", "--onnx is for runs, for bear, "),
         (
             "humanoid --skill climb",
             "no policy drives the joints of humanoid: the robot has 2 legs, and the policy drives "
@@ -108,6 +109,18 @@ def test_bad_input_is_refused_at_once(words: str, said: str, refused: Callable[.
     Path("folder.mp4").mkdir()
     Path("folder.onnx").mkdir()
     assert said in refused(*shlex.split(words))
+
+
+def test_the_policy_of_all_legs_is_written_for_one_robot(command: Command) -> None:
+    pytest.importorskip("onnx")
+    assert "hexapod-walk.onnx" in command("play hexapod --onnx").out
+    written, shipped = open_policy("hexapod-walk.onnx"), draft.policy("hexapod")
+    seen = np.random.default_rng(0).normal(size=(5, 66))
+    assert written(seen) == pytest.approx(shipped(seen), abs=1e-6)
+    for name in ("joints", "terms", "control_period", "contact_time"):
+        assert getattr(written, name) == getattr(shipped, name)
+    for name in ("home", "stiffness", "damping", "stall_torque", "no_load_speed", "action_scale"):
+        assert getattr(written, name) == pytest.approx(getattr(shipped, name))
 
 
 def test_a_shipped_policy_is_copied_as_onnx(command: Command) -> None:

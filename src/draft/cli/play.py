@@ -33,6 +33,7 @@ from draft.learn.silence import quiet
 from draft.learn.training.run import is_run, open_run
 
 if TYPE_CHECKING:
+    from draft.learn.policy.policy import Policy
     from draft.learn.training.run import Run
     from draft.learn.watching.play import Player
 
@@ -199,13 +200,10 @@ def _play_design(
     name = short(design.reference)
     stem = "-".join([Path(name).name.replace(":", "-"), *([] if own else [skill or "walk"])])
     asked = make_output(Path(f"{stem}.mp4"), Path(f"{stem}.onnx"))
-    if asked.onnx is not None and (own or name not in designs()):
-        cause = f"--onnx is for runs and for {_SPECIAL}: the policy of others has other joints"
-        raise DraftError(cause, "omit --onnx")
     robot, warning = playback(design, skill, own, course)
     chosen = robot.policy
     if asked.onnx is not None:
-        write(asked.onnx, chosen.file.read_bytes())
+        write(asked.onnx, _exported(chosen, design, own))
         _print_export(asked.onnx, chosen.design, chosen.iterations)
     if not asked.web and not asked.films:
         return 0
@@ -218,6 +216,26 @@ def _play_design(
         asked.serve(lambda *at: contextlib.closing(PlaybackPage(robot, *at)))
     asked.film(robot, f"{design.reference}, {chosen.file if own else skill or 'walk'}")
     return 0
+
+
+def _exported(policy: Policy, design: Design, own: Sequence[str]) -> bytes:
+    """File of the policy of a design: the shipped one, or what that of all legs is for it.
+
+    Raises:
+        DraftError: it is a policy with the joints of another robot.
+    """
+    from draft.learn.bodies.legged import legged_robot
+    from draft.learn.policy.onnx_write import of_policy
+    from draft.learn.policy.reduced import LegsPolicy, open_any
+
+    if short(design.reference) in designs() and not own:
+        return policy.file.read_bytes()
+    legs = open_any(policy.file)
+    if isinstance(legs, LegsPolicy):
+        member = legged_robot(design)
+        return of_policy(policy, member, legs.commands_for(member).tolist())
+    cause = f"--onnx is for runs, for {_SPECIAL}, and for robots that the policy of any legs drives"
+    raise DraftError(cause, "omit --onnx: this policy has the joints of another robot")
 
 
 def _only_for_runs(**given: object) -> None:

@@ -99,7 +99,14 @@ def laptop(stage: str, *words: str, worlds: int, ground: Any = "flat", **values:
     return env
 
 
-def drive(env: Any, patch: pytest.MonkeyPatch, forward: Any, measured: Any, seconds: float) -> None:
+def drive(
+    env: Any,
+    patch: pytest.MonkeyPatch,
+    forward: Any,
+    measured: Any,
+    seconds: float,
+    steady: bool = True,
+) -> None:
     """Command every robot straight ahead, and let the speeds that are measured be others.
 
     Args:
@@ -108,6 +115,7 @@ def drive(env: Any, patch: pytest.MonkeyPatch, forward: Any, measured: Any, seco
         forward: commanded speeds [m/s].
         measured: measured speeds [m/s].
         seconds: how long [s].
+        steady: whether their episodes are some seconds old.
     """
     term, ahead = command_term(env), torch.tensor([1.0, 0.0, 0.0])
     for kind in (term.is_standing_env, term.is_heading_env):
@@ -117,5 +125,8 @@ def drive(env: Any, patch: pytest.MonkeyPatch, forward: Any, measured: Any, seco
     term.vel_command_b[:], speeds = both[..., None] * ahead
     data = SimpleNamespace(root_link_lin_vel_b=speeds, heading_w=torch.zeros(env.num_envs))
     patch.setattr(term, "robot", SimpleNamespace(data=data))
+    # They have stood for so long, unless the test says otherwise.
+    since = torch.full((env.num_envs,), 1000) if steady else env.episode_length_buf
+    patch.setattr(env, "episode_length_buf", since)
     for _ in range(round(seconds / env.step_dt)):
         term._update_command()

@@ -78,6 +78,17 @@ def test_the_fastest_command_grows_where_fast_ones_are_tracked_and_shrinks_where
     assert term.range_now()[0, 0].item() - before == pytest.approx(change)
 
 
+def test_robots_that_have_just_begun_and_may_fall_ahead_let_nothing_grow(
+    running: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    term: Any = command_term(running)
+    for one in (term._reached, term._since, term.grown):
+        one.zero_()
+    monkeypatch.setattr(running, "episode_length_buf", torch.zeros(WORLDS, dtype=torch.long))
+    drive(running, monkeypatch, 0.9, 0.9, 3.0, steady=False)
+    assert not term.grown.any()
+
+
 def test_a_reset_of_some_robots_is_no_sample(running: Any) -> None:
     term: Any = command_term(running)
     term._since.zero_()

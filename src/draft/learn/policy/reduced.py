@@ -51,13 +51,14 @@ class LegsPolicy:
         network: network from padded observations to actions of the slots.
         known: ends of each feature of the bodies of the training, by number of legs, each of
             shape (2, FEATURES).
-        forward: largest |vx| that was commanded, per sqrt(g L), by number of legs.
+        commands: largest |vx| and |vy| that were commanded, per sqrt(g L), and |wz|, times
+            sqrt(L / g), by number of legs.
     """
 
     file: Path
     network: Network
     known: Mapping[int, Array]
-    forward: Mapping[int, float]
+    commands: Mapping[int, tuple[float, ...]]
 
     def ends(self, legs: int) -> tuple[Array, Array]:
         """Lower and upper ends of the features of bodies with this number of legs.
@@ -70,10 +71,12 @@ class LegsPolicy:
         every = np.array([*self.known.values()])
         return every[:, 0].min(axis=0), every[:, 1].max(axis=0)
 
-    def forward_for(self, member: LeggedRobot) -> float:
-        """Largest |vx| that was commanded, at the size of a robot [m/s]."""
-        share = self.forward.get(len(member.feet), min(self.forward.values()))
-        return share * math.sqrt(GRAVITY * member.leg_length)
+    def commands_for(self, member: LeggedRobot) -> Array:
+        """Largest |vx|, |vy| [m/s] and |wz| [rad/s] that were commanded, at the size of a robot."""
+        least = np.min([*self.commands.values()], axis=0)
+        rate = math.sqrt(GRAVITY / member.leg_length)
+        speed = rate * member.leg_length
+        return np.array(self.commands.get(len(member.feet), least)) * (speed, speed, rate)
 
     def nearest(self, own: Array, legs: int) -> Array:
         """Features of a robot as the nearest of the training, shape (FEATURES,)."""
@@ -151,7 +154,7 @@ class LegsPolicy:
             terms=terms,
             scan_points=np.zeros((0, 2)),
             scan_range=1.0,
-            forward=self.forward_for(member),
+            forward=float(self.commands_for(member)[0]),
             features=np.zeros(0),
             known=np.zeros((2, 0)),
             leg_length=member.leg_length,
@@ -233,11 +236,11 @@ def open_legs_policy(path: str | Path) -> LegsPolicy:
 def _legs(file: Path, network: Network) -> LegsPolicy:
     texts = network.metadata
     try:
-        pairs = (pair.split(";") for pair in texts["forward"].split(","))
-        forward = {int(legs): float(speed) for legs, speed in pairs}
+        rows = (row.split(";") for row in texts["commands"].split(","))
+        commands = {int(legs): (float(x), float(y), float(z)) for legs, x, y, z in rows}
         known = {
             legs: np.array(texts[f"features_of_{legs}"].split(","), float).reshape(2, -1)
-            for legs in forward
+            for legs in commands
         }
         counts = {values.shape[1] for values in known.values()}
         if network.size != size("actor") or counts != {FEATURES}:
@@ -251,7 +254,7 @@ def _legs(file: Path, network: Network) -> LegsPolicy:
     except (KeyError, ValueError) as error:
         cause = f"{file} is no policy of all legs: {str(error).strip(chr(39))}"
         raise DraftError(cause, _REMEDY) from None
-    return LegsPolicy(file, network, known, forward)
+    return LegsPolicy(file, network, known, commands)
 
 
 def _ends(text: str) -> tuple[float, float]:

@@ -127,7 +127,7 @@ def velocity(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
 def any_legs(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
     """Walk from scratch at commands that grow, with one policy for robots of any legs.
 
-    Sums over joints count as those of twelve. Robots on two legs are asked half of the speed.
+    Sums over joints count as those of twelve. Robots on two legs are asked lower speeds.
     """
     from mjlab.managers.reward_manager import RewardTermCfg
 
@@ -149,8 +149,8 @@ def any_legs(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
 
 def largest_of_any(numbers: Velocity, legs: int) -> tuple[Scaled, Scaled, Scaled]:
     """Largest |vx|, |vy| and |wz| of stage `any` for robots on a number of legs."""
-    share = _ON_TWO_LEGS if legs == 2 else 1.0
-    forward, sideways = (Scaled(share * x, 0.5) for x in (numbers.forward, numbers.sideways))
+    ahead, aside = _ON_TWO_LEGS if legs == 2 else (1.0, 1.0)
+    forward, sideways = Scaled(ahead * numbers.forward, 0.5), Scaled(aside * numbers.sideways, 0.5)
     return forward, sideways, Scaled(numbers.turn, -0.5)
 
 
@@ -213,7 +213,7 @@ def _slow(task: Task) -> tuple[Scaled, Scaled, Scaled]:
 
 # Stages of the paper, which a study trains unless its file names others.
 _JOINTS = 12  # Of the robots that the weights of the rewards are for.
-_ON_TWO_LEGS = 0.5
+_ON_TWO_LEGS = 0.2, 0.5  # Shares of the speeds ahead and to the side in stage `any`.
 PUBLISHED = (
     Stage("base", base, origin=None),
     Stage("velocity", velocity, test="speed"),

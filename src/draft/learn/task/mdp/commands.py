@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
 # Share of the largest |vx| above which a command is fast; time after which speeds are compared
-# with it [s]; samples per world after which the largest |vx| may grow.
-_FAST, _LONG, _ENOUGH = 0.7, 1.5, 4
+# with it, of a command and of an episode [s]; samples per world after which the largest |vx| may
+# grow.
+_FAST, _LONG, _STEADY, _ENOUGH = 0.7, 1.5, 4.0, 4
 
 
 class Growth(NamedTuple):
@@ -227,6 +228,8 @@ class VelocityCommand(UniformVelocityCommand):
         self._since += self._env.step_dt
         forward, largest = self.vel_command_b[:, 0], self.range_now()[:, 0]
         fast = (forward.abs() > _FAST * largest) & (self._since > _LONG)
+        # A robot that falls ahead is fast too.
+        fast &= self._env.episode_length_buf > _STEADY / self._env.step_dt
         if self.pushed is not None:
             fast &= ~self.pushed
         along = self.robot.data.root_link_lin_vel_b[:, 0] * forward.sign()

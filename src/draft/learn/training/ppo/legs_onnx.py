@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
-import onnx
-from onnx import helper, numpy_helper
 
 from draft.errors import DraftError
 from draft.extras import own_version
 from draft.files import write
 from draft.learn.bodies.features import GRAVITY
-from draft.learn.bodies.legged import by_topology, kind_of
+from draft.learn.bodies.legged import REFERENCE_LEG, by_topology, kind_of
 from draft.learn.bodies.slots import ranges, slot_features
+from draft.learn.policy.onnx_write import chain
 from draft.learn.policy.reduced import LAYOUT
+from draft.learn.task.stages import largest_of_any
 from draft.learn.training.ppo.checkpoint import read_checkpoint
 from draft.learn.training.progress import FASTEST, PROGRESS
 from draft.learn.training.progress import read as read_progress
@@ -40,37 +41,14 @@ def export_legs(run: Run, path: Path, iteration: int | None = None) -> None:
     number, file = run.checkpoint(iteration)
     state = read_checkpoint(file, "cpu")["actor_state_dict"]
     arrays = {name: values.numpy().astype(np.float32) for name, values in state.items()}
-    weights = {
-        "mean": arrays["obs_normalizer._mean"][0],
-        "divisor": arrays["obs_normalizer._std"][0] + _EPSILON,
-    }
-    nodes = [
-        helper.make_node("Sub", ["obs", "mean"], ["centred"]),
-        helper.make_node("Div", ["centred", "divisor"], ["x0"]),
-    ]
     layers = sorted(int(name.split(".")[1]) for name in arrays if name.endswith(".weight"))
-    for k, layer in enumerate(layers):
-        last = k + 1 == len(layers)
-        out = "actions" if last else f"y{k}"
-        for kind in ("weight", "bias"):
-            weights[f"{kind}{k}"] = arrays[f"mlp.{layer}.{kind}"]
-        names = [f"x{k}", f"weight{k}", f"bias{k}"]
-        nodes.append(helper.make_node("Gemm", names, [out], alpha=1.0, beta=1.0, transB=1))
-        if not last:
-            nodes.append(helper.make_node("Elu", [out], [f"x{k + 1}"], alpha=1.0))
-    sizes = {"obs": len(weights["mean"]), "actions": len(weights[f"bias{len(layers) - 1}"])}
-    seen, actions = (
-        [helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, [1, count])]
-        for name, count in sizes.items()
+    model = chain(
+        arrays["obs_normalizer._mean"][0],
+        arrays["obs_normalizer._std"][0] + _EPSILON,
+        [(arrays[f"mlp.{layer}.weight"], arrays[f"mlp.{layer}.bias"]) for layer in layers],
+        _metadata(run, number),
     )
-    tensors = [numpy_helper.from_array(values, name) for name, values in weights.items()]
-    model = helper.make_model(
-        helper.make_graph(nodes, "legs", seen, actions, tensors),
-        opset_imports=[helper.make_opsetid("", 18)],
-    )
-    helper.set_model_props(model, _metadata(run, number))
-    onnx.checker.check_model(model)
-    write(path, model.SerializeToString())
+    write(path, model)
 
 
 def _metadata(run: Run, iteration: int) -> dict[str, str]:
@@ -94,21 +72,25 @@ def _metadata(run: Run, iteration: int) -> dict[str, str]:
         "stiffness": f"{config.actuation.stiffness:.9g}",
         "damping": f"{config.actuation.damping:.9g}",
         **{f"features_of_{legs}": _row(values.ravel()) for legs, values in ends.items()},
-        "forward": _forward(run, iteration),
+        "commands": _commands(run, iteration),
         "draft_version": own_version(),
     }
 
 
-def _forward(run: Run, iteration: int) -> str:
-    """Largest |vx| that was commanded, per sqrt(g L), by number of legs."""
-    found: dict[int, float] = {}
+def _commands(run: Run, iteration: int) -> str:
+    """Largest commands, per sqrt(g L) and sqrt(g / L), by number of legs."""
+    found: dict[int, list[float]] = {}
     rows = [row for row in read_progress(run.folder / PROGRESS) if row["iteration"] <= iteration]
     for members in by_topology(run.plan.members):
-        speeds = (row.get(f"{kind_of(members)}/{FASTEST}", 0.0) for row in rows)
-        size = np.mean([np.sqrt(GRAVITY * member.leg_length) for member in members])
-        legs = len(members[0].feet)
-        found[legs] = max(found.get(legs, 0.0), max(speeds, default=0.0) / float(size))
-    return ",".join(f"{legs};{speed:.4g}" for legs, speed in found.items())
+        speeds = [row.get(f"{kind_of(members)}/{FASTEST}", 0.0) for row in rows]
+        sizes = np.array([member.leg_length for member in members])
+        legs, rate = len(members[0].feet), math.sqrt(GRAVITY / REFERENCE_LEG)
+        _, sideways, turn = largest_of_any(run.plan.config.velocity, legs)
+        reached = max(speeds, default=0.0) / float(np.sqrt(GRAVITY * sizes).mean())
+        one = [reached, sideways.value / (rate * REFERENCE_LEG), turn.value / rate]
+        found[legs] = np.maximum(found.get(legs, [0.0] * 3), one).tolist()
+    rows = ([str(legs), *(f"{x:.4g}" for x in one)] for legs, one in found.items())
+    return ",".join(map(";".join, rows))
 
 
 def _row(values: object) -> str:

@@ -12,7 +12,6 @@ import contextlib
 import io
 import tempfile
 import warnings
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +24,7 @@ from draft.extras import own_version
 from draft.files import write
 from draft.learn.bodies.features import family_features, features
 from draft.learn.policy.matching import structure_of
+from draft.learn.policy.onnx_write import text
 from draft.learn.task.mdp.commands import command_term
 from draft.learn.task.stages import is_like
 from draft.learn.task.world.access import robot_of
@@ -105,7 +105,7 @@ def metadata(player: Loaded, run: Run) -> dict[str, str]:
             "design_features_low": bodies.min(axis=0).tolist(),
             "design_features_high": bodies.max(axis=0).tolist(),
         }
-    return {key: _text(value) for key, value in values.items()}
+    return {key: text(value) for key, value in values.items()}
 
 
 def _gains(env: ManagerBasedRlEnv) -> tuple[list[float], list[float]]:
@@ -123,20 +123,3 @@ def _dims(env: ManagerBasedRlEnv) -> list[int]:
     """Length of each observation term of the actor."""
     dims = env.observation_manager.group_obs_term_dim["actor"]
     return [one[0] for one in dims]
-
-
-def _text(value: object) -> str:
-    """A value in the format of mjlab's metadata, with all its digits."""
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return ",".join(
-            ";".join(map(_one, x))
-            if isinstance(x, Sequence) and not isinstance(x, str)
-            else _one(x)
-            for x in value
-        )
-    return _one(value)
-
-
-def _one(value: object) -> str:
-    # Nine digits restore every number of single precision.
-    return f"{value:.9g}" if isinstance(value, float) else str(value)
