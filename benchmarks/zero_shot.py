@@ -7,7 +7,7 @@
 Each robot is its maker's: kinematics, masses, inertias, torques and speeds of the description, and
 the law's torques and speeds where it has a placeholder (`draft.validation.arms.by_maker`). It walks
 for 12 s at four commands, up to sqrt(g L) on four legs or more and half of it on two, from noisy
-starts, and is pushed while it walks. Some eight minutes on two idle cores.
+starts, and is pushed while it walks. Some five minutes on two idle cores.
 """
 
 from __future__ import annotations
@@ -197,9 +197,9 @@ def measured(job: Job) -> dict[str, Any]:
 
 
 def outside(legs: LegsPolicy, member: LeggedRobot) -> dict[str, Any]:
-    """How far a robot lies outside the region, and its farthest numbers."""
+    """How far a robot lies outside the region, and its farthest numbers, of the left alone."""
     found = legs.departures(member, describe(member)[1])
-    farthest = [str(one) for one in found[:_NAMED]]
+    farthest = [str(one) for one in found if " right " not in one.name][:_NAMED]
     return {"outside": round(distance(legs, member), 3), "farthest": farthest}
 
 

@@ -1,7 +1,7 @@
 """What one policy for all legs can do: writes docs/any-legs.md.
 
     python -m benchmarks.any_legs --out examples/results/any_legs.json    # five minutes
-    python -m benchmarks.zero_shot --out examples/results/zero_shot.json  # ten minutes
+    python -m benchmarks.zero_shot --out examples/results/zero_shot.json  # the same
     python -m docs.any_legs --pictures   # film strips of robots that walk, and the page
     python -m docs.any_legs              # the page alone
 
@@ -185,6 +185,8 @@ def page(unseen: Mapping[str, Any], real: Mapping[str, Any], images: Sequence[st
             "",
             *INTRODUCTION.format(**words, seconds=unseen["seconds"]).splitlines(),
             "",
+            *_of_policy(unseen["policy"], real["policy"]),
+            "",
             "## What was asked of it",
             "",
             *_bars([*any_legs.bars(unseen), *zero_shot.bars(real)]),
@@ -206,6 +208,15 @@ def page(unseen: Mapping[str, Any], real: Mapping[str, Any], images: Sequence[st
             *_failures(real),
         )
     )
+
+
+def _of_policy(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
+    """Which policy the numbers are of."""
+    line = f"Measured: the policy after {first['iterations']} iterations, seed {first['seed']}."
+    if first["digest"] == second["digest"]:
+        return [line]
+    other = f"{second['iterations']} iterations, seed {second['seed']}"
+    return [line, f"The real robots were measured with another one: {other}."]
 
 
 def _bars(rows: Sequence[Mapping[str, Any]]) -> list[str]:
