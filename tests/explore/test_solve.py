@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 import draft
 import draft.explore.solve as module
 from draft.errors import DraftError
-from draft.explore.solve import Solution, solve
+from draft.explore.nearest import Solution
+from draft.explore.solve import solve
 from draft.metrics import of_design
 from tests.commands import Command
 

@@ -23,7 +23,7 @@ from draft.values import told_apart
 
 if TYPE_CHECKING:
     from draft.design import Design
-    from draft.explore.solve import Solution
+    from draft.explore.nearest import Solution
 
 NOT_MET = 1
 

@@ -12,6 +12,7 @@ from draft.design import Design
 from draft.errors import DraftError
 from draft.explore import where
 from draft.explore.where import Condition
+from draft.metrics import LEARNED
 from draft.spec import Spec
 from draft.spec.expressions import syntax_tree
 from draft.values import Array, Value
@@ -130,3 +131,8 @@ def _constraint(spec: Spec, node: ast.expr) -> Constraint:
         case ast.Compare(left=left, ops=[ast.Gt() | ast.GtE()], comparators=[right]):
             gap = (condition(right), condition(left))
     return Constraint(ast.unparse(node), condition(node), gap)
+
+
+def by_rollouts(condition: Constraint) -> bool:
+    """Whether a condition needs roll-outs."""
+    return any(name in LEARNED for name in condition.holds.metrics)

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.errors import DraftError
-from draft.explore.goals import Constraint
+from draft.explore.goals import Constraint, by_rollouts
 from draft.explore.learned_effects import open_policy, silent
+from draft.explore.nearest import Conflict, Search, Solution
 from draft.explore.settings import TargetSettings
-from draft.explore.solve import Conflict, Search, Solution, by_rollouts
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.measuring.evaluation_options import BodyRollOuts
 from draft.learn.measuring.learned_metrics import walkers

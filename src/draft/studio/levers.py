@@ -13,8 +13,9 @@ import numpy as np
 
 from draft.design import Design
 from draft.errors import DraftError
+from draft.explore.nearest import Solution
 from draft.explore.sensitivity import sensitivity, stated_numbers
-from draft.explore.solve import Solution, solve
+from draft.explore.solve import solve
 from draft.metrics import find, of_design
 from draft.metrics.registry import reads_verdict
 from draft.studio import fields

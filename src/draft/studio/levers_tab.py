@@ -8,8 +8,8 @@ from typing import Any
 import viser
 
 from draft.errors import DraftError
+from draft.explore.nearest import Solution
 from draft.explore.sensitivity import closed_metrics, stated_numbers
-from draft.explore.solve import Solution
 from draft.studio import cards
 from draft.studio.levers import NOTHING, Levers, between, to_target
 from draft.studio.session import Session

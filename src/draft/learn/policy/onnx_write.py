@@ -60,7 +60,7 @@ def chain(
 
 
 def of_policy(policy: Policy, member: LeggedRobot, commands: Sequence[float]) -> bytes:
-    """Return the file of a policy, as `draft play RUN --onnx` writes that of a run.
+    """Return the file of a policy, as the export of a run is written.
 
     Args:
         policy: the policy, which observes neither its design nor the ground.
