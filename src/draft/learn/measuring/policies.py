@@ -201,7 +201,7 @@ def _with_drive(policy: Policy, name: str, drive: Drive) -> Source:
         members=(),
         stage=policy.stage,
         seed=policy.seed,
-        config=_config(policy),
+        config=config_of(policy),
         ground="flat",
         see_design=bool(len(policy.features)),
         see_ground=bool(len(policy.scan_points)),
@@ -219,7 +219,7 @@ def _with_drive(policy: Policy, name: str, drive: Drive) -> Source:
     )
 
 
-def _config(policy: Policy) -> Config:
+def config_of(policy: Policy) -> Config:
     """Numbers of the task of an exported policy: those of recipe laptop, but for what it states."""
     own = {
         "physics.timestep": policy.timestep,

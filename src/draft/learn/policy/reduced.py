@@ -84,19 +84,25 @@ class LegsPolicy:
         """Features of a robot as the nearest of the training, shape (FEATURES,)."""
         return np.where(owned(own), np.clip(own, *self.ends(legs)), own)
 
-    def departures(self, member: LeggedRobot, own: Array) -> tuple[Departure, ...]:
-        """What of a robot lies outside the training, the farthest first.
+    def distances(self, own: Array, legs: int) -> Array:
+        """How far features of a robot lie outside the training, shape (FEATURES,).
 
         The measure is the distance to the nearer end, per the width of the range or one tenth,
         whichever is larger.
+        """
+        low, high = self.ends(legs)
+        width = np.maximum(high - low, _NARROW)
+        return np.abs(own - np.clip(own, low, high)) / width * owned(own)
+
+    def departures(self, member: LeggedRobot, own: Array) -> tuple[Departure, ...]:
+        """What of a robot lies outside the training, the farthest by `distances` first.
 
         Args:
             member: the robot.
             own: its features, shape (FEATURES,).
         """
         low, high = self.ends(len(member.feet))
-        width = np.maximum(high - low, _NARROW)
-        distance = np.abs(own - np.clip(own, low, high)) / width * owned(own)
+        distance = self.distances(own, len(member.feet))
         shown = readable_slots(np.array((own, low, high)), member).T.tolist()
         names, units = feature_names(), feature_units()
         found = []

@@ -190,15 +190,15 @@ def together(kinds: Sequence[Bodies]) -> Bodies:
     )
 
 
-def generate_kind(name: str, count: int, seed: int = 0) -> Bodies:
-    """Draw bodies of one kind, by its name in `KINDS`.
+def generate_kind(name: str, count: int, seed: int = 0, of: Mapping[str, Kind] = KINDS) -> Bodies:
+    """Draw bodies of one kind, by its name; other kinds than `KINDS` can be drawn for tests.
 
     Raises:
         DraftError: too few draws pass.
     """
-    kind = KINDS[name]
+    kind = of[name]
     base = load(kind.spec).resolve()
-    rng = np.random.default_rng([list(KINDS).index(name), seed])
+    rng = np.random.default_rng([list(of).index(name), seed])
 
     def draw(start: int, size: int) -> dict[str, Array]:
         drawn = kind.draw(_Random(rng, size))

@@ -1,0 +1,288 @@
+"""What one policy for all legs can do: writes docs/any-legs.md.
+
+    python -m benchmarks.any_legs --out examples/results/any_legs.json    # five minutes
+    python -m benchmarks.zero_shot --out examples/results/zero_shot.json  # the same
+    python -m docs.any_legs --pictures   # film strips of robots that walk, and the page
+    python -m docs.any_legs              # the page alone
+
+`--policy FILE` of each of them takes another policy than the one that ships.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from draft.offscreen import prefer_offscreen
+
+prefer_offscreen()  # before MuJoCo is imported
+
+import mujoco  # noqa: E402
+
+from benchmarks import any_legs, zero_shot  # noqa: E402
+from benchmarks.roll_outs import PUSH, number, run_as_command  # noqa: E402
+from docs.pictures import shrink  # noqa: E402
+from draft.errors import counted  # noqa: E402
+from draft.files import write  # noqa: E402
+from draft.learn.bodies.features import GRAVITY  # noqa: E402
+from draft.learn.bodies.legged import LeggedRobot  # noqa: E402
+from draft.learn.policy.playback import Playback, Scenario  # noqa: E402
+from draft.learn.policy.policy import ANY, Policy  # noqa: E402
+from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
+from draft.learn.policy.strip import INTERVAL, Shot, moments, save  # noqa: E402
+from draft.twins.compare import Comparison, compare_twin  # noqa: E402
+from draft.validation.arms import by_maker  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE, IMAGES = ROOT / "docs/any-legs.md", ROOT / "docs/images/any_legs"
+UNSEEN = ROOT / "examples/results/any_legs.json"
+REAL = ROOT / "examples/results/zero_shot.json"
+# Number of strips, shots of each, time that a robot walks [s], and sizes [pixels].
+PICTURES, SHOTS, SECONDS, SIZE, WIDTH = 12, 6, 4.0, (640, 360), 720
+_MASSES = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
+# Why robots do not walk, by name, as found by looking at them.
+CAUSES: Mapping[str, str] = {}
+INTRODUCTION = """\
+Draft ships one policy that walks robots of any legs: two, four or six of them, with three to six
+driven joints each. It observes and moves joints by their place, which is the side, the order from
+the front and the role in the leg, and is told torques, speeds, inertias and lengths of the body,
+all without units. For one robot that is an ordinary small network of its own joints, which NumPy
+runs in {ms} ms for {joints} joints. It has learnt on bodies that Draft draws, of five kinds in one
+run (`draft train any`), and has seen no real robot. Outside the ranges of these bodies, its region
+of validity, it takes the nearest numbers that it knows, says so and tries.
+
+In this page velocities are per sqrt(g L) and rates of turn per sqrt(g / L), with the leg length L.
+Roll-outs last {seconds:g} s from noisy starts, with the noise and the delays of the training. An
+error is the mean distance of the trunk's velocity from the command, over time and over the
+roll-outs that stay up. Pushes change the velocity by up to {push:g} sqrt(g L) along x and along y,
+three times."""
+BODIES = """\
+{bodies} bodies of the generator, drawn with another seed than those of the training, {each} each at
+every command, and kinds that were never trained: knees that point away from each other, five joints
+a leg, and eight legs. Cells: share that stays up, and the mean error; sideways and turning: share
+that stays up, and the velocity that was reached. Written by `python -m benchmarks.any_legs`."""
+ROBOTS = """\
+Machines from their makers' descriptions, with their joints, lengths, masses, inertias, torques and
+speeds, and the law's torques and speeds where a description has a placeholder; {each} each at every
+command. A robot walks if {up} of them stay up and the error is at most {error:g}. The nearest limit
+is that of the joints at the fastest command at which half stay up: the 95th percentile of torque or
+of speed over its limit, or of the sum of both, which is 1 on the torque-speed line. Outside: the
+largest distance of a number of the robot from those of the training, per the width of their range.
+Names that begin with `twin` are further files of machines that are listed already and count once.
+Written by `python -m benchmarks.zero_shot`."""
+
+
+def main(
+    pictures: bool = False,
+    robots: Path = zero_shot.ROBOTS,
+    policy: Path = ANY,
+    only: tuple[str, ...] = (),
+) -> None:
+    """Write the page.
+
+    Args:
+        pictures: whether to draw the film strips anew.
+        robots: folder of the descriptions.
+        policy: policy of all legs.
+        only: robots of the strips; by default a dozen that walk.
+    """
+    real = json.loads(REAL.read_text(encoding="utf-8"))
+    if pictures:
+        names = only or pictured(real)
+        files = {entry.key: entry.file for entry in zero_shot.entries(robots)}
+        legs = open_legs_policy(policy)
+        IMAGES.mkdir(parents=True, exist_ok=True)
+        for old in IMAGES.glob("*.png"):
+            old.unlink()
+        for name in names:
+            strip(legs, files[name], IMAGES / f"{name}.png")
+    write(PAGE, page(json.loads(UNSEEN.read_text(encoding="utf-8")), real, drawn()))
+    print(PAGE)
+
+
+def pictured(real: Mapping[str, Any]) -> list[str]:
+    """A dozen robots that walk: those that follow best, half of them on two legs if there are."""
+    found = {}
+    for group, at in zero_shot.AT.items():
+        rows = [row for row in zero_shot.machines(real, group) if zero_shot.walks(row, at)]
+        rows.sort(key=lambda row: row["cases"][f"{at:g}"]["error"])
+        found[group] = [row["robot"] for row in rows]
+    four, two = found.values()
+    few = min(len(two), max(PICTURES // 2, PICTURES - len(four)))
+    return [*four[: PICTURES - few], *two[:few]]
+
+
+def drawn() -> list[str]:
+    """Robots whose film strips are there."""
+    return sorted(path.stem for path in IMAGES.glob("*.png"))
+
+
+class _Maker(Playback):
+    """A robot with the masses of its maker."""
+
+    def __init__(self, policy: Policy, twin: Comparison, member: LeggedRobot, speed: float) -> None:
+        super().__init__(policy, twin.design, Scenario((speed, 0.0, 0.0)))
+        own = mujoco.MjModel.from_xml_string(member.xml)
+        for i in range(1, own.nbody):
+            place = self.model.body(own.body(i).name).id
+            for name in _MASSES:
+                getattr(self.model, name)[place] = getattr(own, name)[i]
+        mujoco.mj_setConst(self.model, self.data)
+        self.reset()
+
+
+def strip(legs: LegsPolicy, file: Path, path: Path) -> None:
+    """Draw a film strip of a robot at the command of its bar, unless it falls."""
+    from draft.learn.policy.video import Film
+
+    twin = compare_twin(file, poses=2)
+    member = by_maker(twin)
+    speed = zero_shot.AT[zero_shot.group_of({"legs": len(member.feet)})]
+    root = math.sqrt(GRAVITY * member.leg_length)
+    player = _Maker(legs.of_robot(member), twin, member, speed * root)
+    wanted = moments(player.steps(SECONDS), SHOTS, player.period)
+    shots: list[Shot] = []
+    with contextlib.closing(Film(player, SIZE)) as camera:
+
+        def shoot(step: int) -> None:
+            if step in wanted:
+                camera.frame(INTERVAL)
+                shots.append(camera.shot(step * player.period))
+
+        outcome = player.play(SECONDS, shoot)
+    words = f"{path.stem}: {outcome.speed / root:.2f} sqrt(g L)"
+    if outcome.falls:
+        print(f"{words}, {counted(outcome.falls, 'fall')}: left out")
+        return
+    save(path, shots)
+    shrink(path, WIDTH)
+    print(f"{words}, {path.stat().st_size / 1000:.0f} kB")
+
+
+def page(unseen: Mapping[str, Any], real: Mapping[str, Any], images: Sequence[str]) -> str:
+    """The page.
+
+    Args:
+        unseen: results of `benchmarks.any_legs`.
+        real: results of `benchmarks.zero_shot`.
+        images: robots with film strips.
+    """
+    action = unseen["action"]
+    words = {"ms": f"{action['ms']:.2g}", "joints": action["joints"], "push": PUSH}
+    each = counted(unseen["replicas"], "roll-out")
+    starts = real["replicas"]
+    of_real = {"each": counted(starts, "roll-out"), "error": zero_shot.ERROR}
+    of_real["up"] = f"{math.ceil(zero_shot.UP * starts - 1e-9)} of {starts}"
+    return "\n".join(
+        (
+            "# Any legs: one policy",
+            "",
+            "<!-- Written by `python -m docs.any_legs`; do not edit. -->",
+            "",
+            *INTRODUCTION.format(**words, seconds=unseen["seconds"]).splitlines(),
+            "",
+            *_of_policy(unseen["policy"], real["policy"]),
+            "",
+            "## What was asked of it",
+            "",
+            *_bars([*any_legs.bars(unseen), *zero_shot.bars(real)]),
+            "",
+            "## Bodies that it was not trained with",
+            "",
+            *BODIES.format(bodies=unseen["bodies"], each=each).splitlines(),
+            "",
+            *_table(any_legs.COLUMNS, unseen["kinds"]),
+            "",
+            "## Real robots",
+            "",
+            *ROBOTS.format(**of_real).splitlines(),
+            "",
+            *_robots(real),
+            *_pictures(images),
+            "## What does not walk, and why",
+            "",
+            *_failures(real),
+        )
+    )
+
+
+def _of_policy(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
+    """Which policy the numbers are of."""
+    line = f"Measured: the policy after {first['iterations']} iterations, seed {first['seed']}."
+    if first["digest"] == second["digest"]:
+        return [line]
+    other = f"{second['iterations']} iterations, seed {second['seed']}"
+    return [line, f"The real robots were measured with another one: {other}."]
+
+
+def _bars(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    lines = ["| what | measured | bar | |", "| --- | ---: | ---: | --- |"]
+    for row in rows:
+        limit = f"{'at least' if row['at_least'] else 'at most'} {number(row['bar'], row['unit'])}"
+        word = "met" if row["met"] else "**missed**"
+        value = number(row["value"], row["unit"])
+        lines.append(f"| {row['what']} | {value} | {limit} | {word} |")
+    return lines
+
+
+def _table(columns: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    lines = [f"| {' | '.join(columns)} |", "| --- |" + " ---: |" * (len(columns) - 1)]
+    return lines + [f"| {' | '.join(cell(row) for cell in columns.values())} |" for row in rows]
+
+
+def _robots(real: Mapping[str, Any]) -> list[str]:
+    lines = []
+    for group in zero_shot.AT:
+        rows = [row for row in real["robots"] if "reason" not in row]
+        rows = [row for row in rows if zero_shot.group_of(row) == group]
+        if rows:
+            title = f"### {group[0].upper()}{group[1:]}"
+            lines += [title, "", *_table(zero_shot.columns(group), rows), ""]
+    noted = [row for row in real["robots"] if row.get("notes")]
+    lines += [f"- {row['robot']}: {'; '.join(row['notes'])}." for row in noted]
+    return [*lines, ""] if noted else lines
+
+
+def _pictures(images: Sequence[str]) -> list[str]:
+    if not images:
+        return []
+    four, two = zero_shot.AT.values()
+    lines = [
+        "### How they walk",
+        "",
+        f"At {four:g} sqrt(g L), and on two legs at {two:g}: time and way below each picture. The",
+        "bodies are those that Draft draws, with the makers' masses.",
+        "",
+    ]
+    for name in images:
+        lines += [f"![{name}, walking](images/any_legs/{name}.png)", "", f"{name}", ""]
+    return lines
+
+
+def _failures(real: Mapping[str, Any]) -> list[str]:
+    """Robots that do not walk, with what is known of each, and those that are not measured."""
+    lines = []
+    for group, at in zero_shot.AT.items():
+        for row in zero_shot.machines(real, group):
+            if zero_shot.walks(row, at):
+                continue
+            one = row["cases"][f"{at:g}"]
+            error = "" if one["error"] is None else f", error {one['error']:.2f}"
+            words = f"- {row['robot']}, at {at:g}: {number(one['up'], '%')} up{error}"
+            if row["farthest"]:
+                words += f"; outside the region: {'; '.join(row['farthest'])}"
+            cause = CAUSES.get(row["robot"])
+            lines.append(f"{words}. {cause}" if cause else f"{words}.")
+    missing = [row for row in real["robots"] if "reason" in row and not row["again"]]
+    if missing:
+        lines += ["", "Not measured:", ""] if lines else ["Not measured:", ""]
+        lines += [f"- {row['robot']}: {row['reason']}." for row in missing]
+    return [*lines, ""] if lines else ["All walk.", ""]
+
+
+if __name__ == "__main__":
+    run_as_command(main, __doc__)
