@@ -253,6 +253,26 @@ def test_without_a_home_pose_legs_crouch_and_other_joints_stay_at_zero(tmp_path:
     assert home["FL_knee"] < -0.5
 
 
+@pytest.mark.parametrize(("least", "share"), [(-2.8, 1.0), (-0.95, 0.9), (-0.55, 0.5)])
+def test_the_crouch_is_as_deep_as_the_ranges_allow(
+    least: float, share: float, tmp_path: Path
+) -> None:
+    bare = ((", home: crouch / 2", ""), (", home: -crouch", ""))
+    edits = (*bare, ("range: [-2.8, 0]", f"range: [{least}, 0]"))
+    found = legged_robot(changed(tmp_path / "robot", *edits))
+    home = dict(zip(found.joints, found.home, strict=True))
+    deepest = legged_robot(changed(tmp_path / "deepest", *bare)).home
+    knee = found.joints.index("FL_knee")
+    assert home["FL_knee"] == pytest.approx(share * deepest[knee])
+    assert home["FL_hip_pitch"] == pytest.approx(share * deepest[knee - 1])
+
+
+def test_an_anchor_of_a_joint_in_the_middle_may_lie_aside_on_its_axis(tmp_path: Path) -> None:
+    found = legged_robot(changed(tmp_path / "robot", *arm("y", at=", at: [0, 0.05, 0]")))
+    shoulder = found.joints.index("shoulder")
+    assert (found.mirror[shoulder], found.mirror_sign[shoulder]) == (shoulder, 1.0)
+
+
 @pytest.mark.parametrize(("axis", "sign"), [("x", -1.0), ("y", 1.0), ("z", -1.0)])
 def test_a_joint_in_the_middle_mirrors_to_itself(axis: str, sign: float, tmp_path: Path) -> None:
     found = legged_robot(changed(tmp_path / "robot", *arm(axis)))

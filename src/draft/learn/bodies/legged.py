@@ -7,7 +7,7 @@ else that has a driven joint, such as arms and a waist, moves by the same policy
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import takewhile
 from typing import TYPE_CHECKING, Any
@@ -273,6 +273,7 @@ def with_one_template(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]
     return tuple(replace(member, text=text) for member, text in zip(members, texts, strict=True))
 
 
+_SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # Of the crouch.
 _TOPOLOGY = ("trunk", "joints", "leg_joints", "feet", "foot_geoms", "upper_legs", "mirror")
 
 
@@ -308,19 +309,33 @@ def check_family(members: Sequence[LeggedRobot]) -> None:
 
 
 def _home(design: Design, name: str) -> tuple[float, ...]:
-    """Home pose; the crouch if the spec gives none."""
+    """Home pose; if the spec gives none, the crouch, or a share of it that the ranges allow.
+
+    The feet stay level and nearly below the hips: all angles of a leg have the same share.
+    """
     home = {joint: scalar(one.home) for joint, one in design.joints.items()}
     if not any(home.values()):
-        home |= {n: float(j.angle) for leg in legs(design) for j in leg.joints for n in j.names}
+        angles = {n: float(j.angle) for leg in legs(design) for j in leg.joints for n in j.names}
+        shares = (home | {n: share * x for n, x in angles.items()} for share in _SHARES)
+        home = next((one for one in shares if _beyond(design, one) is None), home | angles)
+    joint = _beyond(design, home)
+    if joint is not None:
+        low, high = (scalar(x) for x in design.joints[joint].range)
+        raise DraftError(
+            f"{name} cannot crouch: {joint} at {home[joint]:.2f} rad is outside its range "
+            f"{low:.2f} to {high:.2f}",
+            "add `home` to its joints in tree.yaml",
+        )
+    return tuple(home[joint] for joint in design.joints)
+
+
+def _beyond(design: Design, home: Mapping[str, float]) -> str | None:
+    """First joint whose angle is outside its range; None for none."""
     for joint, angle in home.items():
         low, high = (scalar(x) for x in design.joints[joint].range)
         if not low <= angle <= high:
-            raise DraftError(
-                f"{name} cannot crouch: {joint} at {angle:.2f} rad is outside its range "
-                f"{low:.2f} to {high:.2f}",
-                "add `home` to its joints in tree.yaml",
-            )
-    return tuple(home[joint] for joint in design.joints)
+            return joint
+    return None
 
 
 def _height(model: Model, home: Sequence[float], geoms: Sequence[str]) -> float:

@@ -27,7 +27,7 @@ from draft.learn.bodies.legged import (
     stated_battery,
     stated_electronics,
 )
-from draft.learn.bodies.topology import APART
+from draft.learn.bodies.topology import APART, MIDDLE
 from draft.metrics.speed import top_speed
 from draft.model import pose
 from draft.model.batch import ModelBatch, build_batch, follows_mujoco
@@ -152,11 +152,18 @@ def _alike(design: Design, first_row: int, first: LeggedRobot) -> NDArray[np.boo
         for body, (origin, _) in zip(design.bodies, frames, strict=True)
         if body.joint is not None
     }
+    lines = {
+        body.prefix + body.joint.name: _table(design, [*g.rotate(rotation, body.joint_axis)])
+        for body, (_, rotation) in zip(design.bodies, frames, strict=True)
+        if body.joint is not None
+    }
     of_legs = {joint for leg in first.leg_joints for joint in leg}
     for joint, other in enumerate(first.mirror):
         if joint not in of_legs:
             a, b = (_table(design, [*anchors[first.joints[k]]]) for k in (joint, other))
-            alike &= np.linalg.norm(a * (1.0, -1.0, 1.0) - b, axis=1) < APART
+            far, axis = a * (1.0, -1.0, 1.0) - b, lines[first.joints[other]][first_row]
+            alike &= np.linalg.norm(far - (far @ axis)[:, None] * axis, axis=1) <= APART
+            alike &= (other != joint) | (abs(a[:, 1]) <= MIDDLE)
     return np.asarray(alike)
 
 

@@ -19,7 +19,8 @@ from draft.errors import DraftError
 from draft.values import scalar
 
 LEAST_LEGS = 2
-APART = 0.02  # largest distance between an anchor and the image of its counterpart [m]
+MIDDLE = 0.08  # largest distance of the anchor of a joint of the middle from there [m]
+APART = 0.02  # largest distance between an axis and the image of its counterpart's [m]
 
 
 @dataclass(frozen=True)
@@ -105,8 +106,8 @@ def mirrored_joints(
 ) -> tuple[dict[str, str], dict[str, float]]:
     """For each joint, the one that the mirror image of its motion turns, and with which sign.
 
-    Joints of legs are paired by their place in the leg, others by place and axis: the image of an
-    anchor is the nearest anchor whose axis is parallel to the image of the axis.
+    Joints of legs are paired by their place in the leg, others by the line of their axis: the image
+    of an anchor is the nearest anchor on its image.
 
     Returns:
         Name of the other joint, and sign, 1 or -1, by joint.
@@ -121,11 +122,18 @@ def mirrored_joints(
     rest = [joint for joint in design.joints if joint not in other]
     for joint in rest:
         image = _image(_axis(design, body[joint]))
-        parallel = [k for k in rest if abs(np.dot(image, _axis(design, body[k]))) > PARALLEL]
         x, y, z = _anchor(design, body[joint])
-        away = {k: math.dist((x, -y, z), _anchor(design, body[k])) for k in parallel}
+        away: dict[str, float] = {}
+        for k in rest:
+            axis = np.array(_axis(design, body[k]))
+            far = np.subtract((x, -y, z), _anchor(design, body[k]))
+            # Makers put an anchor anywhere along its axis.
+            aside = np.linalg.norm(far - (far @ axis) * axis)
+            middle = k != joint or abs(y) <= MIDDLE
+            if abs(np.dot(image, axis)) > PARALLEL and aside <= APART and middle:
+                away[k] = float(np.linalg.norm(far))
         nearest = min(away, key=lambda k: away[k], default="")
-        if not nearest or away[nearest] > APART:
+        if not nearest:
             raise _untrainable(name, f"its joint {joint} has no counterpart on the other side")
         other[joint] = nearest
     sign = {}
