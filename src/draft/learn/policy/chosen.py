@@ -8,9 +8,10 @@ from draft.learn.policy import policy as shipped
 
 if TYPE_CHECKING:
     from draft.design import Design
+    from draft.learn.policy.policy import Policy
 
 
-def policy(design: str | Design, skill: str = "walk") -> shipped.Policy:
+def policy(design: str | Design, skill: str = "walk") -> Policy:
     """Load the policy that ships for a design, with the joints and motors of the design.
 
         >>> walk = draft.policy("cheetah")
