@@ -37,7 +37,7 @@ from draft.learn.task.world.access import robot_of  # noqa: E402
 from draft.learn.task.world.task import Task  # noqa: E402
 from draft.learn.training.ppo.legs_onnx import export_legs  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
-from draft.learn.training.ppo.worlds import Worlds  # noqa: E402
+from draft.learn.training.ppo.worlds import Worlds, by_bodies  # noqa: E402
 from draft.learn.training.run import Run, open_run  # noqa: E402
 from draft.learn.watching.side_by_side import SideBySide  # noqa: E402
 from tests.commands import Command  # noqa: E402
@@ -77,6 +77,17 @@ def test_a_resumed_training_is_the_same_bit_by_bit(tmp_path: Path) -> None:
     first, second = train(whole, 4, engine="native"), train(parts, 1, 4, engine="native")
     for name, values in weights(first).items():
         assert torch.equal(values, weights(second)[name]), name
+
+
+def test_worlds_are_divided_by_the_numbers_of_bodies() -> None:
+    bodies = [800, 300, 400, 200, 300]
+    for processes in (1, 2):
+        counts = by_bodies(256, bodies, processes)
+        assert sum(counts) == 256
+        shares = np.array(counts) / 256 * sum(bodies) / np.array(bodies)
+        assert shares == pytest.approx(1.0, abs=0.1)
+    assert by_bodies(10, [4, 2, 2, 1, 2], 2) == [2] * 5
+    assert by_bodies(7, [3], 2) == [7]
 
 
 def test_actions_of_absent_joints_are_not_learnt(run: Run) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -42,6 +43,20 @@ def share(worlds: int, part: int, parts: int) -> int:
     return worlds // parts + (part < worlds % parts)
 
 
+def by_bodies(worlds: int, bodies: Sequence[int], processes: int) -> list[int]:
+    """Divide worlds over topologies by their numbers of bodies, one for each process at least.
+
+    Args:
+        worlds: number of worlds.
+        bodies: number of bodies of each topology.
+        processes: number of processes that share the worlds.
+    """
+    least = min(processes, worlds // len(bodies))
+    spare = worlds - least * len(bodies)
+    ends = [round(spare * sum(bodies[: k + 1]) / sum(bodies)) for k in range(len(bodies))]
+    return [least + end - start for start, end in zip([0, *ends], ends, strict=False)]
+
+
 class Worlds:
     """Worlds of one process of a run.
 
@@ -62,8 +77,10 @@ class Worlds:
         """
         self._groups = by_topology(plan.members)
         self.envs: list[ManagerBasedRlEnv] = []
-        for k, members in enumerate(self._groups):
-            of_all = share(plan.environments, k, len(self._groups))
+        self._counts = by_bodies(
+            plan.environments, [len(group) for group in self._groups], replicas
+        )
+        for members, of_all in zip(self._groups, self._counts, strict=True):
             before = sum(share(of_all, i, replicas) for i in range(rank))
             cfg = environment(task_of(plan, members), share(of_all, rank, replicas), before=before)
             cfg.seed = rank_seed(plan.seed, rank)
@@ -74,8 +91,8 @@ class Worlds:
         """Begin the logs, and the turns of families of more bodies than worlds."""
         self._tallies = [Tally(env, ranks) for env in self.envs]
         self._bodies: list[Bodies | None] = []
-        for k, (env, members) in enumerate(zip(self.envs, self._groups, strict=True)):
-            in_turn = len(members) > share(plan.environments, k, len(self._groups))
+        for env, members, count in zip(self.envs, self._groups, self._counts, strict=True):
+            in_turn = len(members) > count
             taken = in_turn or (plan.mixed and len(members) > 1)
             self._bodies.append(Bodies(env, members, plan.seed, ranks) if taken else None)
 
