@@ -48,7 +48,10 @@ def chain(
     single = {name: np.asarray(values, np.float32) for name, values in weights.items()}
     seen, actions = (
         [onnx.helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, [1, count])]
-        for name, count in (("obs", len(single["mean"])), ("actions", len(single[names[-1]])))
+        for name, count in (
+            ("obs", len(single["mean"])),
+            ("actions", len(single[f"bias{len(layers) - 1}"])),
+        )
     )
     tensors = [onnx.numpy_helper.from_array(values, name) for name, values in single.items()]
     graph = onnx.helper.make_graph(nodes, "policy", seen, actions, tensors)
