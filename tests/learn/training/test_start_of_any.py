@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
 import pytest
-from onnx import numpy_helper
 
 torch = pytest.importorskip("torch")
+onnx = pytest.importorskip("onnx")
 pytest.importorskip("mjlab")
 
 from draft import learn  # noqa: E402
@@ -109,9 +108,9 @@ def changed(file: Path, folder: Path, change: Callable[[onnx.ModelProto], None])
 
 def not_finite(model: onnx.ModelProto) -> None:
     tensor = next(one for one in model.graph.initializer if one.name == "weight1")
-    values = numpy_helper.to_array(tensor).copy()
+    values = onnx.numpy_helper.to_array(tensor).copy()
     values[0, 0] = np.nan
-    tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))
+    tensor.CopyFrom(onnx.numpy_helper.from_array(values, tensor.name))
 
 
 def other_layout(model: onnx.ModelProto) -> None:
@@ -123,8 +122,8 @@ def other_layout(model: onnx.ModelProto) -> None:
 def other_slots(model: onnx.ModelProto) -> None:
     for tensor in model.graph.initializer:
         if tensor.name in ("weight2", "bias2"):
-            values = numpy_helper.to_array(tensor)[:-1]
-            tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))
+            values = onnx.numpy_helper.to_array(tensor)[:-1]
+            tensor.CopyFrom(onnx.numpy_helper.from_array(values, tensor.name))
 
 
 @pytest.mark.parametrize(
