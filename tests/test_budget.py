@@ -24,7 +24,7 @@ BUDGET = {
     "fitting": 3_710,
     "imports": 6_250,
     "laws": 1_910,
-    "learn": 19_730,
+    "learn": 19_750,
     "metrics": 1_910,
     "model": 3_920,
     "reporting": 1_820,

@@ -198,6 +198,10 @@ def test_a_robot_outside_the_training_counts_as_the_nearest_inside(legs: LegsPol
     joints = SLOTS + np.array(slots.joints)
     assert legs.nearest(own, 4)[joints] == pytest.approx(high[joints])
     assert legs.nearest(own, 4)[:SLOTS] == pytest.approx(own[:SLOTS])
+    without = own.copy()
+    without[slots.joints[0]] = 0.0  # All quadrupeds of the training have this joint.
+    assert legs.nearest(without, 4)[slots.joints[0]] == 0.0
+    assert legs.distances(without, 4)[slots.joints[0]] == 10.0
     seen = np.zeros(9 + 3 * 12 + 3)
     assert np.isfinite(legs.of_robot(strong)(seen)).all()
 

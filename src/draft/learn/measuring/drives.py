@@ -147,7 +147,7 @@ class BySlots:
 
     def includes(self, member: LeggedRobot, own: Array) -> bool:
         """Whether a body lies in the region."""
-        return bool((np.abs(own - self.policy.nearest(own, len(member.feet))) <= SAME).all())
+        return bool((self.policy.distances(own, len(member.feet)) <= SAME).all())
 
     def departures(self, member: LeggedRobot) -> tuple[Departure, ...]:
         """What of a robot lies outside the region."""

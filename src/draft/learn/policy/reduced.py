@@ -81,8 +81,13 @@ class LegsPolicy:
         return np.array(self.commands.get(len(member.feet), least)) * (speed, speed, rate)
 
     def nearest(self, own: Array, legs: int) -> Array:
-        """Features of a robot as the nearest of the training, shape (FEATURES,)."""
-        return np.where(owned(own), np.clip(own, *self.ends(legs)), own)
+        """Features of a robot as the nearest of the training, shape (FEATURES,).
+
+        Joints that it lacks stay absent.
+        """
+        lacks = np.zeros(len(own), bool)
+        lacks[:SLOTS] = own[:SLOTS] == 0
+        return np.where(owned(own) & ~lacks, np.clip(own, *self.ends(legs)), own)
 
     def distances(self, own: Array, legs: int) -> Array:
         """How far features of a robot lie outside the training, shape (FEATURES,).
