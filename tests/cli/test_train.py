@@ -130,7 +130,10 @@ def test_a_family_is_drawn_and_trained_in_one_simulation(command: Command) -> No
                 ("quadruped --bodies 3", "--bodies draws designs, but nothing is varied"),
                 ("cheetah bear --envs 1", "1 world cannot hold 2 designs"),
                 ("cheetah --from nowhere", "there is no policy 'nowhere' to start from"),
-                ("cheetah --from nowhere", "name the folder of a run, an ONNX file, 'family'"),
+                (
+                    "cheetah --from nowhere",
+                    "name the folder of a run, an ONNX file, 'any', 'family'",
+                ),
                 ("cheetah --from nowhere.onnx", "cannot read nowhere.onnx"),
                 ("humanoid --from family", "does not drive the joints of humanoid"),
                 ("cheetah --out ' '", "--out names no folder"),

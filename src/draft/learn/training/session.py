@@ -17,6 +17,7 @@ from draft.learn.engine.machine import KINDS, NATIVE, Engine
 from draft.learn.policy.reduced import open_for
 from draft.learn.policy.validity import check_policy
 from draft.learn.silence import quiet
+from draft.learn.task.constants import JOINTS
 from draft.learn.task.stages import STAGES
 from draft.learn.training.options import SliceOptions
 from draft.learn.training.progress import Progress
@@ -170,8 +171,9 @@ class Setting:
         text = f"{kind} on {where} ({self.engine.why}), {counted(plan.environments, 'world')}"
         text += f" in {self.processes} processes" if self.processes > 1 else ""
         joints = sorted(len(member.joints) for member in plan.members)
-        span = " to ".join(map(str, dict.fromkeys((joints[0], joints[-1]))))
-        text += f"; {counted(iterations, 'iteration')} for {span} joints"
+        if joints[-1] > JOINTS:
+            span = " to ".join(map(str, dict.fromkeys((joints[0], joints[-1]))))
+            text += f"; {counted(iterations, 'iteration')} for {span} joints"
         before = run.engine()
         if before not in (None, self.engine.name):
             text += f"; resumed from {before}: the same run, to single precision"
