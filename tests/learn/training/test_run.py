@@ -191,6 +191,8 @@ def test_a_run_resumes_only_with_the_plan_that_created_it(tmp_path: Path) -> Non
 def test_the_iterations_of_a_run_are_those_of_its_joints_unless_they_are_given(
     tmp_path: Path,
 ) -> None:
+    pytest.importorskip("torch")
+
     def total(design: str, **options: Any) -> int:
         given = TrainOptions.of({"device": "cpu", **options})
         run = prepare(design, tmp_path / f"{len(list(tmp_path.iterdir()))}", given)
