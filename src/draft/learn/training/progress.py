@@ -173,11 +173,13 @@ def gained(path: Path) -> str | None:
     errors, falls = (
         [row.get(name, math.nan) for row in (first, last)] for name in ("tracking_error", "falls")
     )
-    return (
+    text = (
         f"gained in training: commands are missed by {errors[1]:.2f} m/s, at first by "
-        f"{errors[0]:.2f} m/s, and {share(falls[1])} of episodes end in a fall, at first "
-        f"{share(falls[0])} (means of {counted(count, 'iteration')})"
+        f"{errors[0]:.2f} m/s"
     )
+    if not any(map(math.isnan, falls)):  # NaN where no episode ended.
+        text += f", and {share(falls[1])} of episodes end in a fall, at first {share(falls[0])}"
+    return f"{text} (means of {counted(count, 'iteration')})"
 
 
 def _column(path: Path, name: str, iteration: float) -> list[float]:
