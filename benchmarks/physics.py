@@ -59,8 +59,8 @@ def main(
     for name in names:
         member = _robot(name, robots)
         source, climber = open_source(policy, blind=True, robot=member), None
-        if stairs:
-            climber = source if policy or source.of_any_legs else climbing_family()
+        if stairs and not source.of_any_legs:
+            climber = source if policy else climbing_family()
         print(f"| {name} | {' | '.join(SHOWN)} |")
         measured = under_physics(source, member, chosen, replicas=replicas, climber=climber)
         for one, found in measured:

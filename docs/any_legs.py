@@ -54,11 +54,12 @@ in five worlds, and their knees bend three ways at the same places, so that thos
 each other walk last. Real humanoids lie outside the numbers of the training, whose bodies are all
 of one build: feet, hips, ankles and masses of others differ."""
 INTRODUCTION = """\
-Draft ships one policy that walks robots of any legs: two, four or six of them, with three to six
-driven joints each. It observes and moves joints by their place, which is the side, the order from
-the front and the role in the leg, and is told torques, speeds, inertias and lengths of the body,
-all without units. For one robot that is an ordinary small network of its own joints, which NumPy
-runs in {ms} ms for {joints} joints. It has learnt on bodies that Draft draws, of five kinds in one
+Draft ships one policy for robots of any legs: two, four or six of them, with three to six driven
+joints each. The shipped hexapod, biped and humanoid walk with it, most real robots not yet. It
+observes and moves joints by their place, which is the side, the order from the front and the role
+in the leg, and is told torques, speeds, inertias and lengths of the body, all without units. For
+one robot that is an ordinary small network of its own joints, which NumPy runs in {ms} ms for
+{joints} joints. It has learnt on bodies that Draft draws, of five kinds in one
 run (`draft train any`), and has seen no real robot. Outside the ranges of these bodies, its region
 of validity, it takes the nearest numbers that it knows, says so and tries.
 

@@ -177,9 +177,10 @@ def _policies(
             raise
         notes.append(f"not measured by roll-outs: {error.problems[0].cause}")
         return None, None
-    if policy is not None or source.of_any_legs:
-        return source, source
-    return source, climbing_family()
+    if source.of_any_legs:  # It has not learnt to climb.
+        notes.append("steps were not measured: the policy of all legs does not climb")
+        return source, None
+    return source, source if policy is not None else climbing_family()
 
 
 def _surveyed(key: str) -> bool:

@@ -19,8 +19,11 @@ from draft.learn.bodies.slots import (
     ROLES,
     SLOTS,
     describe,
+    feature_names,
+    feature_units,
     mirrored_features,
     mirrored_slots,
+    readable_slots,
     slot_features,
     slots_of,
 )
@@ -156,3 +159,27 @@ def test_knees_away_from_each_other_are_kept_for_tests() -> None:
     }
     assert bends == {(-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)}
     assert SLOTS == 36
+
+
+@pytest.mark.parametrize("name", ["cheetah", "humanoid", "hexapod"])
+def test_the_numbers_of_a_body_are_read_back_in_their_units(name: str) -> None:
+    member = legged_robot(draft.load("quadruped" if name == "cheetah" else name).resolve())
+    slots, own = describe(member)
+    names = dict(zip(feature_names(), readable_slots(own, member), strict=True))
+    assert len(names) == len(feature_units()) == len(own)
+    for joint, slot in enumerate(slots.joints):
+        if slot < 0:
+            continue
+        place = f"{LEGS[slot // len(ROLES)]} {ROLES[slot % len(ROLES)]}"
+        assert names[f"{place} joints"] == 1.0
+        assert names[f"peak torque of the {place}"] == pytest.approx(member.peak_torque[joint])
+        assert names[f"no-load speed of the {place}"] == pytest.approx(member.no_load_speed[joint])
+        bend = slots.signs[joint] * np.sin(member.home[joint])
+        assert np.sin(names[f"bend of the {place}"]) == pytest.approx(bend)
+    for number, value in {
+        "leg length": member.leg_length,
+        "mass": member.mass,
+        "height": member.height,
+        "legs": len(member.feet),
+    }.items():
+        assert names[number] == pytest.approx(value)

@@ -152,16 +152,12 @@ def _alike(design: Design, first_row: int, first: LeggedRobot) -> NDArray[np.boo
         for body, (origin, _) in zip(design.bodies, frames, strict=True)
         if body.joint is not None
     }
-    lines = {
-        body.prefix + body.joint.name: _table(design, [*g.rotate(rotation, body.joint_axis)])
-        for body, (_, rotation) in zip(design.bodies, frames, strict=True)
-        if body.joint is not None
-    }
+    lines = dict(zip(anchors, axes[first_row].reshape(-1, 3), strict=True))
     of_legs = {joint for leg in first.leg_joints for joint in leg}
     for joint, other in enumerate(first.mirror):
         if joint not in of_legs:
             a, b = (_table(design, [*anchors[first.joints[k]]]) for k in (joint, other))
-            far, axis = a * (1.0, -1.0, 1.0) - b, lines[first.joints[other]][first_row]
+            far, axis = a * (1.0, -1.0, 1.0) - b, lines[first.joints[other]]
             alike &= np.linalg.norm(far - (far @ axis)[:, None] * axis, axis=1) <= APART
             alike &= (other != joint) | (abs(a[:, 1]) <= MIDDLE)
     return np.asarray(alike)

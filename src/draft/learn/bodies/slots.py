@@ -103,9 +103,10 @@ def ranges(features: Array) -> Array:
 
 def feature_names() -> list[str]:
     """Name of each number."""
-    slots = [f"the {leg} {role}" for leg in LEGS for role in ROLES]
+    slots = [f"{leg} {role}" for leg in LEGS for role in ROLES]
     return [
-        *(f"{number} of {slot}" for number in OF_JOINT for slot in slots),
+        *(f"{slot} joints" for slot in slots),
+        *(f"{number} of the {slot}" for number in OF_JOINT[1:] for slot in slots),
         *(f"{number} of the {leg} leg" for number in OF_LEG for leg in LEGS),
         *OF_BODY,
     ]

@@ -78,6 +78,7 @@ def _serve(folder: Path, host: str, port: int, parent: int) -> None:
             shown = SideBySide(run)
             with contextlib.closing(SideBySidePage(shown, run, host, port, follow=True)) as page:
                 page.run()
+            return
         from draft.learn.watching.play import Player
         from draft.learn.watching.web import Page
 
