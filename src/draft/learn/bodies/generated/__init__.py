@@ -23,7 +23,7 @@ from draft.values import Array
 
 BODIES = 2000  # Usual number of bodies.
 FOLDER = Path(__file__).parent
-STRENGTH = 0.45  # Half width of the logarithm of the factor on the torque.
+STRENGTH = 0.6  # Half width of the logarithm of the factor on the torque.
 _POWER = 3.3  # Power of the leg length that the torque rises with.
 _MARGIN = 1.6  # Least ratio of peak torque to standing torque.
 Draw = Callable[["_Random"], dict[str, Array]]
@@ -67,65 +67,87 @@ class Kind:
 
 def _quadruped(random: _Random) -> dict[str, Array]:
     thigh = random.spread(0.1, 0.55)
-    shank = thigh * random.between(0.8, 1.2)
+    shank = thigh * random.between(0.75, 1.3)
     size = (thigh + shank) / 0.48
     # Knees back, forward, and toward each other; away from each other is kept for tests.
     front, rear = random.one_of(np.array([(1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])).T
     return {
         "thigh_length": thigh,
         "shank_length": shank,
-        "trunk_length": 0.52 * size * random.between(0.8, 1.25),
+        "trunk_length": 0.52 * size * random.between(0.35, 1.2),
         "trunk_width": 0.2 * size * random.between(0.7, 1.3),
         "trunk_height": 0.18 * size * random.between(0.7, 1.2),
-        "hip_spacing": 0.16 * size * random.between(0.8, 1.4),
-        "hip_offset": 0.1 * size * random.between(0.7, 1.2),
-        "crouch": random.between(0.7, 1.6),
+        "hip_spacing": 0.16 * size * random.between(0.6, 1.6),
+        "hip_offset": 0.1 * size * random.between(0.6, 1.6),
+        "crouch": random.between(0.6, 1.7),
         "front_bend": front,
         "rear_bend": rear,
         "torque": 72 * size**_POWER * random.strength(),
-        "speed": 40 / np.sqrt(size) * random.spread(0.35, 1.2),
-        "reduction": random.between(0.9, 2.0),
+        "speed": 40 / np.sqrt(size) * random.spread(0.2, 1.3),
+        "reduction": random.between(0.8, 2.0),
     }
 
 
 def _hexapod(random: _Random) -> dict[str, Array]:
     femur = random.spread(0.09, 0.32)
-    tibia = femur * random.between(1.1, 1.55)
+    tibia = femur * random.between(1.0, 1.7)
     size = (femur + tibia) / 0.38
     return {
         "femur_length": femur,
         "tibia_length": tibia,
-        "body_length": 0.44 * size * random.between(0.8, 1.4),
-        "body_width": 0.2 * size * random.between(0.8, 1.5),
+        "body_length": 0.44 * size * random.between(0.7, 1.5),
+        "body_width": 0.2 * size * random.between(0.7, 1.6),
         "body_height": 0.08 * size * random.between(0.8, 1.3),
-        "lift": random.between(0.25, 0.85),
+        "lift": random.between(0.2, 0.9),
         "foot_radius": np.clip(0.018 * size, 0.006, 0.045),
         "actuators.leg.peak_torque": 14 * size**_POWER * random.strength(),
-        "actuators.leg.no_load_speed": 12 / np.sqrt(size) * random.between(0.9, 2.2),
+        "actuators.leg.no_load_speed": 12 / np.sqrt(size) * random.spread(0.6, 2.4),
     }
 
 
 def _biped(random: _Random) -> dict[str, Array]:
-    thigh = random.spread(0.16, 0.5)
-    shank = thigh * random.between(0.85, 1.15)
+    size, drawn = _two_legs(random)
+    ankle = 55 * size**_POWER * random.spread(0.35, 1.5)
+    return drawn | {
+        "foot_offset": drawn["foot_length"] * random.between(0.0, 0.25),
+        "spread": random.between(0.95, 1.5),
+        "hip_forward": 0.3 * size * random.between(-0.15, 0.15),
+        "actuators.yaw.peak_torque": 110 * size**_POWER * random.spread(0.25, 1.2),
+        "actuators.yaw.no_load_speed": 14 / np.sqrt(size) * random.spread(0.6, 2.0),
+        "actuators.ankle.peak_torque": ankle,
+        "actuators.roll.peak_torque": ankle * random.spread(0.3, 1.0),
+        "actuators.roll.no_load_speed": 14 / np.sqrt(size) * random.spread(0.6, 2.5),
+    }
+
+
+def _biped_of_four(random: _Random) -> dict[str, Array]:
+    size, drawn = _two_legs(random)
+    return drawn | {
+        "actuators.ankle.peak_torque": 55 * size**_POWER * random.spread(0.35, 1.5)
+    }
+
+
+def _two_legs(random: _Random) -> tuple[Array, dict[str, Array]]:
+    """Size over that of legs of 0.6 m, and what bipeds have in common."""
+    thigh = random.spread(0.13, 0.5)
+    shank = thigh * random.between(0.8, 1.25)
     size = (thigh + shank) / 0.6
-    return {
+    return size, {
         "thigh_length": thigh,
         "shank_length": shank,
-        "pelvis_height": 0.16 * size * random.between(0.8, 2.2),
-        "pelvis_depth": 0.2 * size * random.between(0.8, 1.2),
-        "foot_length": np.clip(0.2 * size * random.between(0.85, 1.3), 0.08, 0.4),
-        "foot_width": np.clip(0.09 * size * random.between(0.85, 1.3), 0.04, 0.2),
-        "knee_bend": random.between(0.35, 0.9),
+        "pelvis_height": 0.16 * size * random.between(0.8, 3.0),
+        "pelvis_depth": 0.2 * size * random.between(0.7, 1.2),
+        "foot_length": np.clip(0.2 * size * random.between(0.7, 1.3), 0.06, 0.4),
+        "foot_width": np.clip(0.09 * size * random.between(0.7, 1.3), 0.03, 0.2),
+        "knee_bend": random.between(0.2, 1.2),
         "actuators.hip.peak_torque": 110 * size**_POWER * random.strength(),
-        "actuators.hip.no_load_speed": 14 / np.sqrt(size) * random.between(0.9, 1.6),
-        "actuators.ankle.peak_torque": 55 * size**_POWER * random.strength(),
-        "actuators.ankle.no_load_speed": 14 / np.sqrt(size) * random.between(0.9, 1.6),
+        "actuators.hip.no_load_speed": 14 / np.sqrt(size) * random.spread(0.6, 1.8),
+        "actuators.ankle.no_load_speed": 14 / np.sqrt(size) * random.spread(0.5, 2.5),
     }
 
 
 def _humanoid(random: _Random) -> dict[str, Array]:
-    size = random.spread(0.8, 1.5)
+    size = random.spread(0.7, 1.5)
     torque = size**_POWER
     lengths = {
         "torso_length": 0.5,
@@ -135,29 +157,31 @@ def _humanoid(random: _Random) -> dict[str, Array]:
         "lower_shoulder_length": 0.12,
         "upper_arm_length": 0.1,
         "forearm_length": 0.106,
-        "lower_hip_length": 0.15,
         "thigh_length": 0.2,
         "shank_length": 0.2,
         "foot_length": 0.2,
         "foot_width": 0.085,
         "foot_height": 0.06,
     }
-    drawn = {name: value * size * random.between(0.9, 1.15) for name, value in lengths.items()}
+    drawn = {name: value * size * random.between(0.8, 1.2) for name, value in lengths.items()}
+    # Less of the thigh above its yaw motor: more of its mass lies where that of others does.
+    drawn["lower_hip_length"] = 0.15 * size * random.between(0.7, 1.1)
     speeds = {"large": 5.9, "medium": 10.3, "small": 11.5}
     torques = {"large": 120.0, "medium": 72.0, "small": 24.0}
+    least = {"large": 0.6, "medium": 0.35, "small": 0.5}
     for name, peak in torques.items():
-        drawn[f"actuators.{name}.peak_torque"] = peak * torque * random.strength()
-        speed = speeds[name] / np.sqrt(size) * random.between(0.9, 2.2)
+        drawn[f"actuators.{name}.peak_torque"] = peak * torque * random.spread(least[name], 1.6)
+        speed = speeds[name] / np.sqrt(size) * random.spread(0.7, 3.0)
         drawn[f"actuators.{name}.no_load_speed"] = speed
         drawn[f"actuators.{name}.gear_ratio"] = 292.1 / speed
-    return drawn | {"knee_bend": random.between(0.25, 0.7)}
+    return drawn | {"knee_bend": random.between(0.15, 1.0)}
 
 
 KINDS: Mapping[str, Kind] = {
-    "quadruped": Kind(FOLDER / "quadruped", 0.4, _quadruped),
-    "hexapod": Kind(ROBOTS / "hexapod", 0.15, _hexapod),
-    "biped": Kind(ROBOTS / "biped", 0.2, _biped),
-    "biped_of_four": Kind(FOLDER / "biped_of_four", 0.1, _biped),
+    "quadruped": Kind(FOLDER / "quadruped", 0.45, _quadruped),
+    "hexapod": Kind(ROBOTS / "hexapod", 0.12, _hexapod),
+    "biped": Kind(FOLDER / "biped", 0.2, _biped),
+    "biped_of_four": Kind(FOLDER / "biped_of_four", 0.08, _biped_of_four),
     "humanoid": Kind(ROBOTS / "humanoid", 0.15, _humanoid),
 }
 
