@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 import yaml
@@ -13,9 +14,11 @@ from draft.errors import DraftError
 from draft.learn.bodies.generated import KINDS, generate, generate_kind
 from draft.learn.bodies.legged import LeggedRobot, by_topology, legged_robot
 from draft.learn.bodies.padding import LAYOUTS, mirror_image, places, size
+from draft.learn.bodies.payload import model_spec
 from draft.learn.bodies.slots import (
     FEATURES,
     LEGS,
+    OF_JOINT,
     ROLES,
     SLOTS,
     describe,
@@ -27,6 +30,7 @@ from draft.learn.bodies.slots import (
     slot_features,
     slots_of,
 )
+from draft.model import pose
 
 ROBOTS = {name: legged_robot(draft.load(name).resolve()) for name in ("quadruped", "humanoid")}
 ROBOTS |= {name: generate_kind(name, 1).members[0] for name in KINDS}
@@ -131,15 +135,15 @@ def test_entries_of_joints_without_a_slot_go_nowhere() -> None:
     arm = member.joints.index("left_elbow")
     assert where.entry[arm] == -1
     assert where.entry[-3:].tolist() == [0, 1, 2]
-    source, _ = where.sources("actor")
+    source = where.sources("actor")
     assert (source < len(where.entry)).sum() == 12 + 3
 
 
 def test_generated_bodies_are_of_all_kinds_and_stand() -> None:
     kinds = generate(20)
-    assert [len(one.members) for one in kinds] == [8, 3, 4, 2, 3]
+    assert [len(one.members) for one in kinds] == [9, 2, 4, 2, 3]
     members = [member for one in kinds for member in one.members]
-    assert [len(group) for group in by_topology(members)] == [8, 3, 4, 2, 3]
+    assert [len(group) for group in by_topology(members)] == [9, 2, 4, 2, 3]
     for one in kinds:
         for text in one.texts:
             assert one.spec.resolve(yaml.safe_load(text)["values"]).accepted
@@ -161,6 +165,25 @@ def test_knees_away_from_each_other_are_kept_for_tests() -> None:
     assert SLOTS == 36
 
 
+def test_a_positive_knee_bends_further_whichever_way_it_bends() -> None:
+    bends = []
+    for member in generate_kind("quadruped", 12).members:
+        slots, own = describe(member)
+        model = model_spec(member).compile()
+        data = mujoco.MjData(model)
+        for leg, foot in zip(member.leg_joints, member.feet, strict=True):
+            knee, lengths = leg[-1], []
+            for more in (0.0, 0.1):
+                home = np.array(member.home)
+                home[knee] += slots.signs[knee] * more
+                pose.put(model, data, home)
+                hip = data.xanchor[model.joint(member.joints[leg[1]]).id]
+                lengths.append(np.linalg.norm(data.site_xpos[model.site(foot).id] - hip))
+            assert lengths[1] < lengths[0]
+            bends.append(own[len(OF_JOINT[:-1]) * SLOTS + slots.joints[knee]])
+    assert min(bends) < 0 < max(bends)
+
+
 @pytest.mark.parametrize("name", ["cheetah", "humanoid", "hexapod"])
 def test_the_numbers_of_a_body_are_read_back_in_their_units(name: str) -> None:
     member = legged_robot(draft.load("quadruped" if name == "cheetah" else name).resolve())
@@ -174,8 +197,11 @@ def test_the_numbers_of_a_body_are_read_back_in_their_units(name: str) -> None:
         assert names[f"{place} joints"] == 1.0
         assert names[f"peak torque of the {place}"] == pytest.approx(member.peak_torque[joint])
         assert names[f"no-load speed of the {place}"] == pytest.approx(member.no_load_speed[joint])
-        bend = slots.signs[joint] * np.sin(member.home[joint])
-        assert np.sin(names[f"bend of the {place}"]) == pytest.approx(bend)
+        bend, told = np.sin(member.home[joint]), np.sin(names[f"bend of the {place}"])
+        if place.endswith("knee"):  # Which way it bends is told; its slot has it always positive.
+            assert abs(told) == pytest.approx(abs(bend))
+        else:
+            assert told == pytest.approx(slots.signs[joint] * bend)
     for number, value in {
         "leg length": member.leg_length,
         "mass": member.mass,

@@ -22,6 +22,7 @@ from draft.learn.measuring.rollout import review  # noqa: E402
 from draft.learn.policy.policy import ANY  # noqa: E402
 from draft.learn.policy.reduced import open_legs_policy  # noqa: E402
 from draft.learn.training.options import TrainOptions  # noqa: E402
+from draft.learn.training.ppo.legs_onnx import export_legs  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.warm_start import ALONE  # noqa: E402
 from draft.learn.training.progress import PROGRESS, gained  # noqa: E402
@@ -62,6 +63,21 @@ def test_the_actor_is_the_policy_of_the_robot(file: Path, tmp_path: Path, name: 
     origin = learn.open_run(tmp_path / "run").plan.origin
     assert origin is not None
     assert origin.policy_file == file
+
+
+def test_a_mixture_starts_with_the_policy_itself(file: Path, tmp_path: Path) -> None:
+    trainer = Trainer(learn.begin(tmp_path / "run", mixed_plan(), {}, file), "cpu", engine=QUICK)
+    own = open_legs_policy(file).network
+    seen = torch.randn(3, own.size)
+    observed = trainer._seen[:1].expand(3).clone()
+    observed["actor"] = seen
+    learnt = learner(trainer).get_policy()(observed).detach().numpy()
+    assert learnt == pytest.approx(np.stack([own(one) for one in seen.numpy()]), abs=1e-5)
+    trainer.train(ALONE + 1)
+    export_legs(trainer._run, tmp_path / "more.onnx")
+    before, after = (open_legs_policy(one) for one in (file, tmp_path / "more.onnx"))
+    for legs, most in before.commands.items():
+        assert (np.array(after.commands[legs]) >= most).all()
 
 
 def test_joints_without_a_slot_and_the_height_scan_are_learnt(file: Path, tmp_path: Path) -> None:
@@ -163,6 +179,6 @@ def test_what_the_policy_cannot_drive_is_refused(file: Path, tmp_path: Path) -> 
         of = replace(plan(**FLAT), members=members)
         with pytest.raises(DraftError, match=message):
             learn.begin(tmp_path / "run", of, {}, file)
-    with pytest.raises(DraftError, match="starts from random networks"):
-        learn.begin(tmp_path / "run", mixed_plan(), {}, file)
+    with pytest.raises(DraftError, match="does not start from the run 'elsewhere'"):
+        learn.begin(tmp_path / "run", mixed_plan(), {}, "elsewhere")
     assert not (tmp_path / "run").exists()

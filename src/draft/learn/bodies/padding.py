@@ -76,16 +76,16 @@ class Places:
     sign: Array
     share: Array
 
-    def sources(self, group: str) -> tuple[NDArray[np.intp], Array]:
-        """For each padded entry the index of the robot's own, n for none, and its sign.
+    def sources(self, group: str) -> NDArray[np.intp]:
+        """For each padded entry the index of the robot's own, n for none.
 
         Args:
             group: "actor" or "critic".
         """
-        source, sign = np.full(size(group), len(self.entry)), np.ones(size(group))
+        source = np.full(size(group), len(self.entry))
         for i in np.flatnonzero(self.entry >= 0):
-            source[self.entry[i]], sign[self.entry[i]] = i, self.sign[i]
-        return source, sign
+            source[self.entry[i]] = i
+        return source
 
 
 def places(group: str, terms: Sequence[tuple[str, int]], slots: Slots) -> Places:
@@ -135,6 +135,11 @@ def starts(group: str) -> dict[str, int]:
         found[name] = start
         start += _length(part)
     return found
+
+
+def of_joints(group: str) -> list[str]:
+    """Names of the terms of a padded observation that have an entry for each joint."""
+    return [name for name, part in LAYOUTS[group].items() if part.of == "joints"]
 
 
 def mirror_image(group: str) -> tuple[NDArray[np.intp], Array]:

@@ -40,6 +40,7 @@ FEATURES = len(OF_JOINT) * SLOTS + len(OF_LEG) * len(LEGS) + len(OF_BODY)
 # Units of them, by `readable_slots`.
 _UNITS_OF_JOINT, _UNITS_OF_BODY = ("", "N m", "rad/s", "kg m2", "rad"), ("m", "kg", "m", "", "m")
 _UPRIGHT = 0.7  # Vertical part of an axis from which a joint turns the leg about the vertical.
+_STRAIGHT = 0.02  # Angle of a knee below which a leg counts as straight [rad].
 # A joint of a left leg counts as positive about an axis with a positive part along this.
 _POSITIVE = np.array([1.0, 0.8, 0.5])
 
@@ -181,36 +182,52 @@ class _Pose:
         self.inertia = own.dof_M0[[own.joint(name).dofadr[0] for name in member.joints]]
         self.left = self.feet[:, 1] > 0
 
-    def knee(self, leg: int) -> int:
-        """Place of the knee among the joints of a leg."""
+    def knee(self, leg: int) -> tuple[int, float]:
+        """Place of the knee among the joints of a leg, and its angle from the straight leg."""
         joints = list(self.member.leg_joints[leg])
-        return knee_of(np.array([*self.anchors[joints], self.feet[leg]]), self.axes[joints])[0]
+        return knee_of(np.array([*self.anchors[joints], self.feet[leg]]), self.axes[joints])
 
     def slots(self) -> Slots:
         member = self.member
-        joints, signs = [-1] * len(member.joints), [1.0] * len(member.joints)
-        legs = [0] * len(member.feet)
+        joints, legs = [-1] * len(member.joints), [0] * len(member.feet)
         for left in (True, False):
             side = [leg for leg in range(len(legs)) if self.left[leg] == left]
             side.sort(key=lambda leg: -self.feet[leg, 0])
             for order, leg in enumerate(side):
                 legs[leg] = 2 * _row(order, len(side)) + (not left)
         for leg, of_leg in enumerate(member.leg_joints):
-            chosen = _roles(member, self.axes[list(of_leg)], self.knee(leg), of_leg)
+            chosen = _roles(member, self.axes[list(of_leg)], self.knee(leg)[0], of_leg)
             for joint, role in zip(of_leg, chosen, strict=True):
                 joints[joint] = legs[leg] * len(ROLES) + role
-                if self.left[leg]:
-                    signs[joint] = math.copysign(1.0, float(self.axes[joint] @ _POSITIVE))
+        return Slots(tuple(joints), tuple(self.signs(by_knees=True)), tuple(legs))
+
+    def signs(self, by_knees: bool) -> list[float]:
+        """For each joint, -1 if it turns against the direction that counts as positive.
+
+        Args:
+            by_knees: whether a knee counts as positive where it bends further. Legs whose knees
+                bend the other way then lift their feet by the same actions.
+        """
+        member = self.member
+        signs = [1.0] * len(member.joints)
+        for leg, of_leg in enumerate(member.leg_joints):
+            if not self.left[leg]:
+                continue
+            for joint in of_leg:
+                signs[joint] = math.copysign(1.0, float(self.axes[joint] @ _POSITIVE))
+            knee, angle = self.knee(leg)
+            if by_knees and abs(angle) > _STRAIGHT:
+                signs[of_leg[knee]] = math.copysign(1.0, angle)
         for leg, of_leg in enumerate(member.leg_joints):
             if not self.left[leg]:  # The mirror image of a joint counts alike.
                 for joint in of_leg:
                     signs[joint] = signs[member.mirror[joint]] * member.mirror_sign[joint]
-        return Slots(tuple(joints), tuple(signs), tuple(legs))
+        return signs
 
     def features(self, slots: Slots) -> Array:
         member, length = self.member, self.member.leg_length
         mass = member.mass
-        per_joint = np.zeros((len(OF_JOINT), SLOTS))
+        per_joint, signs = np.zeros((len(OF_JOINT), SLOTS)), self.signs(by_knees=False)
         for joint, slot in enumerate(slots.joints):
             if slot < 0:
                 continue
@@ -219,14 +236,14 @@ class _Pose:
                 math.log(member.peak_torque[joint] / (mass * GRAVITY * length)),
                 math.log(member.no_load_speed[joint] * math.sqrt(length / GRAVITY)),
                 math.log(self.inertia[joint] / (mass * length**2)),
-                slots.signs[joint] * math.sin(member.home[joint]),
+                signs[joint] * math.sin(member.home[joint]),
             )
         per_leg = np.zeros((len(OF_LEG), len(LEGS)))
         middle = self.feet.mean(axis=0)
         for leg, place in enumerate(slots.legs):
             out = 1.0 if self.left[leg] else -1.0
             joints = member.leg_joints[leg]
-            hip, knee = self.anchors[joints[0]], self.anchors[joints[self.knee(leg)]]
+            hip, knee = self.anchors[joints[0]], self.anchors[joints[self.knee(leg)[0]]]
             foot = self.feet[leg]
             per_leg[:, place] = (
                 (hip[0] - middle[0]) / length,
@@ -263,19 +280,25 @@ def slot_features(members: Sequence[LeggedRobot]) -> list[tuple[float, ...]]:
     Raises:
         DraftError: as `slots_of`.
     """
+    return [tuple(features.tolist()) for _, features in described(members)]
+
+
+def described(members: Sequence[LeggedRobot]) -> list[tuple[Slots, Array]]:
+    """Return `describe` of each body of one topology.
+
+    Raises:
+        DraftError: as `slots_of`.
+    """
     if len(members) == 1:
-        return [tuple(describe(members[0])[1].tolist())]
+        return [describe(members[0])]
     first, fields = family_fields(tuple(members))
     model, found = copy.copy(first), []
     data = mujoco.MjData(model)
-    slots = None
     for i, member in enumerate(members):
         for name, values in fields.items():
             getattr(model, name)[:] = values[i]
         mujoco.mj_setConst(model, data)
-        pose = _Pose(member, model)
-        slots = slots or pose.slots()
-        found.append(tuple(pose.features(slots).tolist()))
+        found.append(describe(member, model))
     return found
 
 

@@ -39,7 +39,7 @@ from draft.values import Array
 
 _REMEDY = "use the one that ships, or one of 'draft train any'"
 _NARROW = 0.1  # Width of a range of features below which it counts as this wide.
-LAYOUT = "slots"  # Value of the metadata's key `layout` of such a policy.
+LAYOUT = "slots, knees by their bend"  # Value of the metadata's key `layout` of such a policy.
 # Largest divisor of an observation that is constant in the training, with the epsilon of rsl-rl.
 _CONSTANT = 1.01e-2
 
@@ -61,6 +61,17 @@ class LegsPolicy:
     network: Network
     known: Mapping[int, Array]
     commands: Mapping[int, tuple[float, ...]]
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the training."""
+        return int(self.network.metadata["iteration"])
+
+    @property
+    def action_std(self) -> Array:
+        """Standard deviation of the action of each slot; empty if the file does not state it."""
+        text = self.network.metadata.get("action_std")
+        return np.zeros(0) if text is None else np.array(text.split(","), float)
 
     def ends(self, legs: int) -> tuple[Array, Array]:
         """Lower and upper ends of the features of bodies with this number of legs.
@@ -142,7 +153,7 @@ class LegsPolicy:
             ),
             design=member.name,
             stage=texts["stage"],
-            iterations=int(texts["iteration"]),
+            iterations=self.iterations,
             seed=int(texts["seed"]),
             joints=member.joints,
             structure=structure_of(member, model),
@@ -170,9 +181,9 @@ class LegsPolicy:
 
     def _noise(self, slots: Slots) -> Array:
         """Standard deviation of a robot's actions, with the mean one for joints without a slot."""
-        if "action_std" not in self.network.metadata:
-            return np.zeros(0)
-        known = np.array(self.network.metadata["action_std"].split(","), float)
+        known = self.action_std
+        if not len(known):
+            return known
         at = np.array(slots.joints)
         return np.where(at >= 0, known[at], known[at[at >= 0]].mean())
 

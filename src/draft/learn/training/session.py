@@ -14,7 +14,7 @@ from draft.files import lock
 from draft.learn.bodies.legged import check_family
 from draft.learn.engine import machine
 from draft.learn.engine.machine import KINDS, NATIVE, Engine
-from draft.learn.policy.reduced import open_for
+from draft.learn.policy.reduced import LegsPolicy, open_for, open_legs_policy
 from draft.learn.policy.validity import check_policy
 from draft.learn.silence import quiet
 from draft.learn.task.constants import JOINTS
@@ -81,9 +81,10 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
         return replace(plan, origin=None)
     beside = folder.with_name(folder.name.replace(f"-{plan.stage}-", f"-{before}-"))
     file = policy_file(origin) if origin else None
-    if plan.mixed:
-        cause = "a training of several topologies starts from random networks"
-        raise DraftError(cause, 'omit `origin`, or use `origin="scratch"`')
+    if plan.mixed and file is None:
+        cause = f"a training of several topologies does not start from the run '{origin}'"
+        remedy = 'use `origin="any"` or an ONNX file of such a run'
+        raise DraftError(cause, remedy)
     if file is not None:
         return _with_exported(plan, str(origin), file)
     source = Path(origin) if origin else beside
@@ -119,21 +120,27 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
 
 def _with_exported(plan: Plan, name: str, file: Path) -> Plan:
     """The plan with the exported policy that it starts from."""
-    policy = open_for(file, plan.members)
-    check_policy(policy, plan.members)
+    if plan.mixed:
+        policy = open_legs_policy(file)
+    else:
+        policy = open_for(file, plan.members)
+        check_policy(policy, plan.members)
     layers = (policy.network.units(), plan.config.learning.hidden)
     if layers[0] != layers[1]:
         known, own = (", ".join(map(str, units)) for units in layers)
         cause = f"{file} has layers of {known} units, and this training has {own}"
         remedy = f"`values` learning.hidden={known.replace(' ', '')}"
         raise DraftError(cause, remedy)
+    origin = Origin(name, policy.iterations, file_digest(file))
+    if isinstance(policy, LegsPolicy):
+        return replace(plan, origin=origin)
     sees_design = bool(len(policy.features))
     if plan.see_design and not sees_design:
         cause = f"{file} was trained without `see_design`"
         raise DraftError(cause, "omit `see_design`")
     return replace(
         plan,
-        origin=Origin(name, policy.iterations, file_digest(file)),
+        origin=origin,
         see_ground=plan.see_ground or bool(len(policy.scan_points)),
         see_design=sees_design,
     )

@@ -122,9 +122,7 @@ def _biped(random: _Random) -> dict[str, Array]:
 
 def _biped_of_four(random: _Random) -> dict[str, Array]:
     size, drawn = _two_legs(random)
-    return drawn | {
-        "actuators.ankle.peak_torque": 55 * size**_POWER * random.spread(0.35, 1.5)
-    }
+    return drawn | {"actuators.ankle.peak_torque": 55 * size**_POWER * random.spread(0.35, 1.5)}
 
 
 def _two_legs(random: _Random) -> tuple[Array, dict[str, Array]]:

@@ -16,7 +16,7 @@ from mjlab.rl import RslRlVecEnvWrapper
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from draft.learn.bodies.padding import LAYOUTS, mirror_image, places, powers
+from draft.learn.bodies.padding import LAYOUTS, mirror_image, of_joints, places, powers, starts
 from draft.learn.bodies.slots import SLOTS, mirrored_slots, slots_of
 from draft.learn.task.world.access import robot_of
 from draft.learn.task.world.mirror import Flip
@@ -93,27 +93,27 @@ class _Part:
         for group in LAYOUTS:
             dims = (one[0] for one in manager.group_obs_term_dim[group])
             terms = list(zip(manager.active_terms[group], dims, strict=True))
-            source, sign = places(group, terms, slots).sources(group)
+            source = places(group, terms, slots).sources(group)
             self._pads[group] = (
                 torch.from_numpy(source).to(device),
-                torch.from_numpy(sign).float().to(device),
                 torch.from_numpy(powers(group)).float().to(device),
             )
         driven = [joint for joint, slot in enumerate(slots.joints) if slot >= 0]
         self._driven = torch.tensor(driven, device=device)
         self._slots = torch.tensor([slots.joints[joint] for joint in driven], device=device)
-        self._signs = torch.tensor([slots.signs[joint] for joint in driven], device=device)
         self.present = torch.zeros(env.num_envs, SLOTS, device=device)
         self.present[:, self._slots] = 1.0
 
     def padded(self, seen: TensorDict) -> TensorDict:
         """Observations of this environment's worlds in the slots."""
-        scale = self._robot.unit_logarithms()
+        scale, signs = self._robot.unit_logarithms(), self._robot.sign[:, self._driven]
         found = {}
-        for group, (source, sign, power) in self._pads.items():
+        for group, (source, power) in self._pads.items():
             values = seen[group]
             wide = torch.cat((values, values.new_zeros(len(values), 1)), dim=1)
-            factor = sign * torch.exp(-scale @ power)
+            factor, first = torch.exp(-scale @ power), starts(group)
+            for name in of_joints(group):
+                factor[:, first[name] + self._slots] *= signs
             found[group] = (wide[:, source] * factor).clamp(-_MOST, _MOST)
         return TensorDict(found, batch_size=seen.batch_size)
 
@@ -122,6 +122,6 @@ class _Part:
     ) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
         """Step this environment's worlds by actions of the slots."""
         own = actions.new_zeros(len(actions), self.env.num_actions)
-        own[:, self._driven] = actions[:, self._slots] * self._signs
+        own[:, self._driven] = actions[:, self._slots] * self._robot.sign[:, self._driven]
         seen, rewards, dones, extras = self.env.step(own)
         return self.padded(seen), rewards, dones, extras

@@ -23,7 +23,7 @@ from draft.design.legs import GRAVITY
 from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import REFERENCE_LEG, LeggedRobot
 from draft.learn.bodies.payload import model_spec
-from draft.learn.bodies.slots import slot_features
+from draft.learn.bodies.slots import described
 from draft.learn.task.config import Config
 from draft.learn.task.constants import Scaled
 from draft.learn.task.groups import Actuation
@@ -69,6 +69,7 @@ class Robot(Entity):
         copper_loss: heat per torque squared [W/(N m)^2], shape (worlds, joints).
         weight: weight of the design, without what the task adds [N], shape (worlds,).
         design: features of the design, shape (worlds, features); see `draft.learn.bodies.features`.
+        sign: sign of each joint in its slot, shape (worlds, joints); ones without slots.
     """
 
     cfg: RobotCfg
@@ -83,6 +84,7 @@ class Robot(Entity):
     design: torch.Tensor
     home: torch.Tensor
     ranges: torch.Tensor
+    sign: torch.Tensor
 
     def initialize(self, mj_model: mujoco.MjModel, model: Any, data: Any, device: str) -> None:
         """Allocate the state, and give every world the numbers of its design."""
@@ -114,8 +116,11 @@ class Robot(Entity):
     def _of_designs(
         self, members: Sequence[LeggedRobot], device: str | torch.device
     ) -> dict[str, torch.Tensor]:
-        features = slot_features(members) if self.cfg.by_slots else family_features(tuple(members))
-        return _numbers(members, features, device)
+        if self.cfg.by_slots:
+            slots, features = zip(*described(members), strict=True)
+            return _numbers(members, features, [one.signs for one in slots], device)
+        signs = [(1.0,) * len(one.joints) for one in members]
+        return _numbers(members, family_features(tuple(members)), signs, device)
 
     def unit_logarithms(self) -> torch.Tensor:
         """Logarithms of sqrt(g L) and sqrt(L / g) of each world's design, shape (worlds, 2)."""
@@ -141,8 +146,8 @@ class Robot(Entity):
         Raises:
             KeyError, RuntimeError: they are not those of these worlds.
         """
-        # Earlier states knew straight lines only, and no term of theirs needed masses or heat.
-        usual = {name: getattr(self, name) for name in ("weight", "copper_loss")}
+        # Earlier states knew straight lines only, and no term of theirs needed these numbers.
+        usual = {name: getattr(self, name) for name in ("weight", "copper_loss", "sign")}
         numbers = {"stall_torque": numbers["peak_torque"], **usual, **numbers}
         self.redrawn = True
         for name in NUMBERS:
@@ -189,13 +194,14 @@ class Robot(Entity):
 
 NUMBERS = (
     *("leg_scale", "height", "top_speed", "peak_torque", "stall_torque", "no_load_speed", "design"),
-    *("home", "ranges", "weight", "copper_loss"),
+    *("home", "ranges", "weight", "copper_loss", "sign"),
 )
 
 
 def _numbers(
     members: Sequence[LeggedRobot],
     features: Sequence[ArrayLike],
+    signs: Sequence[ArrayLike],
     device: str | torch.device,
 ) -> dict[str, torch.Tensor]:
     """Numbers of designs by name, shape (designs, ...)."""
@@ -208,7 +214,8 @@ def _numbers(
         "no_load_speed": [m.no_load_speed for m in members],
         "copper_loss": [m.copper_loss for m in members],
         "weight": [GRAVITY * m.mass for m in members],
-        "design": features,
+        "design": np.array(features),
+        "sign": signs,
         "home": [m.home for m in members],
         "ranges": [m.ranges for m in members],
     }

@@ -96,8 +96,15 @@ def _metadata(run: Run, iteration: int) -> dict[str, str]:
 
 
 def _commands(run: Run, iteration: int) -> str:
-    """Largest commands, per sqrt(g L) and sqrt(g / L), by number of legs."""
+    """Largest commands, per sqrt(g L) and sqrt(g / L), by number of legs.
+
+    Those of a policy that the run started from count too: it begins with slow ones again.
+    """
+    origin = run.plan.origin
+    file = origin.policy_file if origin is not None else None
     found: dict[int, list[float]] = {}
+    if file is not None and file.is_file():
+        found = {legs: [*most] for legs, most in open_legs_policy(file).commands.items()}
     rows = [row for row in read_progress(run.folder / PROGRESS) if row["iteration"] <= iteration]
     for members in by_topology(run.plan.members):
         speeds = [row.get(f"{kind_of(members)}/{FASTEST}", 0.0) for row in rows]

@@ -19,7 +19,13 @@ from draft.learn.training.ppo.agent import Runner, agent_settings
 from draft.learn.training.ppo.checkpoint import first_sentence, read_checkpoint, write_checkpoint
 from draft.learn.training.ppo.log import Row, Table
 from draft.learn.training.ppo.ppo import Ppo
-from draft.learn.training.ppo.warm_start import ALONE, load_exported, load_policy, widened
+from draft.learn.training.ppo.warm_start import (
+    ALONE,
+    load_exported,
+    load_of_legs,
+    load_policy,
+    widened,
+)
 from draft.learn.training.ppo.worlds import Worlds
 from draft.learn.training.progress import PROGRESS, Progress
 from draft.learn.training.run import Origin, Run
@@ -223,7 +229,9 @@ class Trainer:
     def _start(self, origin: Origin | None) -> None:
         """Start with the policy of another run, or with the random one of the first process."""
         file = origin.policy_file if origin is not None else None
-        if origin is not None and file is not None:
+        if origin is not None and file is not None and self._run.plan.mixed:
+            load_of_legs(self.runner.alg, file, origin)
+        elif origin is not None and file is not None:
             members = self._run.plan.members
             policy = open_for(file, members)
             of_joints = match_of(policy, members[0])

@@ -6,7 +6,7 @@ with the advantages of a random one the first updates of the actor would undo wh
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,12 @@ from rsl_rl.algorithms import PPO
 
 from draft.errors import DraftError
 from draft.learn.policy.matching import OF_JOINTS, Match
+from draft.learn.policy.onnx_file import read
 from draft.learn.policy.policy import Policy
+from draft.learn.policy.reduced import open_legs_policy
 from draft.learn.training.ppo.checkpoint import first_sentence, read_checkpoint
 from draft.learn.training.run import Origin, file_digest
+from draft.values import Array
 
 Change = Callable[[dict[str, Any]], dict[str, Any]]
 # Iterations of the critic alone.
@@ -80,27 +83,52 @@ def load_exported(
     """
     mean, divisor, layers = policy.network.layers()
     order, sign = _inputs(policy, of_joints)
-    mean, divisor = sign * mean[order], divisor[order]
-    normaliser: Any = alg.get_policy().obs_normalizer  # rsl-rl declares no type of it.
-    deviation = torch.tensor(divisor[None]) - normaliser.eps
-    known = policy.action_std
-    noise = known if len(known) else np.full(len(policy.joints), _ACTION_STD)
     joints, turned = _inverse(of_joints)
     first, bias = layers[0]
     layers[0] = first[:, order] * sign, bias
     last, offset = layers[-1]
     layers[-1] = last[joints] * turned[:, None], offset[joints] * turned
+    known = policy.action_std
+    noise = known if len(known) else np.full(len(policy.joints), _ACTION_STD)
+    state = _state(alg, sign * mean[order], divisor[order], layers, noise[joints])
+    _load(alg, policy.file, origin, {"actor_state_dict": state}, fit)
+
+
+def load_of_legs(alg: PPO, file: Path, origin: Origin) -> None:
+    """Load the actor of a policy of all legs into one of a mixture, which has the same slots.
+
+    Args:
+        alg: rsl-rl's algorithm, into which it is loaded.
+        file: ONNX file of the policy.
+        origin: what the run knows of it.
+
+    Raises:
+        DraftError: as `load_exported`.
+    """
+    mean, divisor, layers = read(file).layers()
+    known = open_legs_policy(file).action_std
+    noise = known if len(known) else np.full(len(layers[-1][1]), _ACTION_STD)
+    state = _state(alg, mean, divisor, layers, noise)
+    _load(alg, file, origin, {"actor_state_dict": state}, lambda content: content)
+
+
+def _state(
+    alg: PPO, mean: Array, divisor: Array, layers: Sequence[tuple[Array, Array]], noise: Array
+) -> dict[str, torch.Tensor]:
+    """State of rsl-rl's model with given layers, statistics and deviation of actions."""
+    normaliser: Any = alg.get_policy().obs_normalizer  # rsl-rl declares no type of it.
+    deviation = torch.tensor(divisor[None]) - normaliser.eps
     state = {
         "obs_normalizer._mean": torch.tensor(mean[None]),
         "obs_normalizer._var": deviation.square(),
         "obs_normalizer._std": deviation,
         "obs_normalizer.count": torch.tensor(_TRAINED_SAMPLES),
-        "distribution.std_param": torch.tensor(noise[joints], dtype=torch.float32),
+        "distribution.std_param": torch.tensor(noise, dtype=torch.float32),
     }
     for i, (weight, bias) in enumerate(layers):
         name = f"mlp.{2 * i}"  # Between the layers there is a function.
         state |= {f"{name}.weight": torch.tensor(weight), f"{name}.bias": torch.tensor(bias)}
-    _load(alg, policy.file, origin, {"actor_state_dict": state}, fit)
+    return state
 
 
 def _inverse(of_joints: Match) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
