@@ -239,7 +239,7 @@ def test_the_band_of_a_robot_of_small_actuators_is_wider_downwards() -> None:
     assert low == pytest.approx(design.mass * math.exp(-math.sqrt(wide)), rel=1e-3)
     assert high == own.high
     (finding,) = [f for f in design.findings if "peak_torque" in f.message]
-    assert "servos are lighter than the trends say" in finding.message
+    assert "servos are lighter than these trends say" in finding.message
 
 
 def test_a_stated_mass_of_a_small_actuator_widens_nothing() -> None:

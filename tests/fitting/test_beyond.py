@@ -13,6 +13,7 @@ from draft.fitting import beyond as fitting
 from draft.fitting.limits import table
 from draft.laws.actuators import laws
 from draft.laws.beyond import beyond
+from draft.laws.servos import EXCLUDED, small_actuators
 
 DOCS = Path(__file__).parents[2] / "docs" / "twins.md"
 
@@ -21,8 +22,8 @@ def test_the_band_of_a_small_actuator_holds_nine_in_ten_of_the_gathered_ones() -
     """Sized by their torque alone, as an import does; before, the bands held 4 of 101."""
     rows = [
         (float(row["stall_torque_Nm"]), float(row["mass_kg"]))
-        for row in table(fitting.SMALL)
-        if row["stall_torque_Nm"] and row["mass_kg"] and fitting.EXCLUDED not in row["note"]
+        for row in small_actuators()
+        if row["stall_torque_Nm"] and row["mass_kg"] and EXCLUDED not in row["note"]
     ]
     small = [row for row in rows if row[0] < 4.1]
     inside, once = [], []

@@ -15,14 +15,16 @@ import pytest
 from draft.fitting import beyond as beyond_fit
 from draft.fitting import limits as limits_fit
 from draft.fitting.actuators.catalogue_refit import actuator_trends
+from draft.fitting.actuators.servo_refit import servo_trends
 from draft.fitting.structure.survey_refit import structure_trends
 from draft.laws.actuators import FILE as ACTUATORS
 from draft.laws.beyond import FILE as BEYOND
 from draft.laws.limits import FILE, limits
+from draft.laws.servos import TRENDS as SERVOS
 from draft.laws.structure import FILE as STRUCTURE
 
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared")) / "data"
-TABLES = ("overload_times", "torque_speed_corners", "legged_batteries", beyond_fit.SMALL)
+TABLES = ("overload_times", "torque_speed_corners", "legged_batteries")
 
 
 def numbers(record: object, path: str = "") -> dict[str, object]:
@@ -49,6 +51,7 @@ def same(shipped: object, fresh: object, rel: float) -> None:
     ("file", "fit", "rel"),
     [
         pytest.param(FILE, limits_fit.records, 1e-6, id="limits"),
+        pytest.param(SERVOS, servo_trends, 1e-6, id="servos"),
         pytest.param(BEYOND, beyond_fit.records, 1e-6, id="beyond"),
         pytest.param(STRUCTURE, structure_trends, 1e-7, id="structure"),
         pytest.param(ACTUATORS, actuator_trends, 1e-7, id="actuators", marks=pytest.mark.slow),

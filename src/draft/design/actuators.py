@@ -11,7 +11,7 @@ import numpy as np
 from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
-from draft.laws.catalogue import Part
+from draft.laws.catalogue import MODULE, SERVO, Part
 from draft.laws.limits import copper_loss
 from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantities
 from draft.laws.torque_speed import Line, stall_torque, torque_speed
@@ -87,6 +87,11 @@ class Actuator(Quantities):
     def like(self) -> str | None:
         """Name of the catalogue part that it starts from; None for none."""
         return self.part.name if self.part is not None else None
+
+    @property
+    def kind(self) -> str:
+        """Family whose laws size it: "module" or "servo"."""
+        return SERVO if self.laws.name == SERVO else MODULE
 
     @property
     def quantities(self) -> tuple[str, ...]:

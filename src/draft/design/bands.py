@@ -28,6 +28,7 @@ from draft.design.actuators import Actuator, size
 from draft.design.design import Design
 from draft.design.structure_law import structure_laws
 from draft.laws.beyond import beyond
+from draft.laws.catalogue import MODULE
 from draft.laws.law import Law, quantile
 from draft.laws.quantities import CORNER
 from draft.values import Array, Value, exp, log, maximum, minimum, some, sqrt, where
@@ -121,7 +122,7 @@ def half_widths(
 
 def small_sigma_of(actuator: Actuator, law: str) -> Value | None:
     """Standard deviation of a law below the torques of its data, 0 within; None where none is."""
-    if law not in _SMALL:
+    if law not in _SMALL or actuator.kind != MODULE:
         return None
     below = actuator.peak_torque < actuator.laws.trends[law].ranges["peak_torque"][0]
     if not some(below):

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from draft.design.actuators import Actuator
 from draft.design.design import Design
 from draft.design.findings import Finding, note
-from draft.laws.catalogue import Extremes, Part, aspect_range, extremes
+from draft.laws.catalogue import MODULE, Extremes, Part, aspect_range, extremes
 from draft.values import Value, either, log, maximum, minimum, power, some
 
 # Real modules reach the limits: rounding must not refuse a design that copies one.
@@ -30,19 +30,19 @@ def actuator(a: Actuator, own: tuple[Part, ...] = ()) -> Iterator[Finding]:
         ("torque_density", "torque density", a.peak_torque / a.mass, "N m/kg"),
         ("power_density", "power density", _peak_power(a) / a.mass, "W/kg"),
     ):
-        limit, source = highest(kind, a.gear_ratio, own)
+        limit, source = highest(kind, a.gear_ratio, own, a.kind)
         yield from note(
             kind,
             a.name,
             value > limit * ROUNDING,
-            f"{name} {{value}} of '{a.name}' is beyond {{limit}}, the highest of modules with "
-            "such a reduction",
+            f"{name} {{value}} of '{a.name}' is beyond {{limit}}, the highest of {a.kind}s "
+            "with such a reduction",
             source,
             value,
             limit,
             unit,
         )
-    low, high = aspect_range(own)
+    low, high = aspect_range(own, a.kind)
     yield from note(
         "aspect_ratio",
         a.name,
@@ -98,13 +98,15 @@ def _outside(a: Actuator) -> Iterator[Finding]:
         low, high = ranges[name]
         value = getattr(a, name)
         below = value < low / ROUNDING
-        servos = "; servos are lighter than the trends say, and the bands hold them"
+        servos = "; servos are lighter than these trends say: `kind: servo` sizes one"
         yield from note(
             "outside_data",
             a.name,
             either(below, value > high * ROUNDING),
-            f"{name} {{value}} of '{a.name}' is outside the range of the fitted modules, "
-            f"{low:.3g} to {high:.3g}" + servos * (name == "peak_torque" and some(below)),
+            f"{name} {{value}} of '{a.name}' is outside the range of the fitted {a.kind}s, "
+            f"{low:.3g} to {high:.3g}"
+            + servos
+            * (name == "peak_torque" and a.kind == MODULE and some(below)),
             "catalogue",
             value,
             None,
@@ -112,7 +114,9 @@ def _outside(a: Actuator) -> Iterator[Finding]:
         )
 
 
-def highest(kind: str, gear_ratio: Value, own: tuple[Part, ...] = ()) -> tuple[Value, str]:
+def highest(
+    kind: str, gear_ratio: Value, own: tuple[Part, ...] = (), of: str = MODULE
+) -> tuple[Value, str]:
     """Highest value of any module with such a reduction, and the modules that reach it.
 
     A family's extreme holds over its range of reductions, and fades continuously beyond it: within
@@ -121,7 +125,7 @@ def highest(kind: str, gear_ratio: Value, own: tuple[Part, ...] = ()) -> tuple[V
     both densities in inverse proportion above the highest, as gears add mass. A higher reduction
     takes no torque away, and a lower one no power.
     """
-    families = extremes(own)[1].values()
+    families = extremes(own, of)[1].values()
     lowest = min(family.gear_range[0] for family in families)
     highest = max(family.gear_range[1] for family in families)
     limits: dict[str, Value] = {}

@@ -94,12 +94,12 @@ _CHECKED = (CORNER, "aspect_ratio")
 def actuator(a: Actuator) -> Iterator[Finding]:
     """Compare what a class states, or has from a robot's own table, with the shipped modules."""
     for name in a.quantities:
-        one, known = QUANTITIES[name], span(name)
+        one, known = QUANTITIES[name], span(name, kind=a.kind)
         if not one.stated or known is None or name in _CHECKED:
             continue
         if a.origins[name].kind not in ("stated", "catalogue"):
             continue
-        of = f"{known.n} modules of the catalogue"
+        of = f"{known.n} {a.kind}s of the catalogue"
         data = Data(known.low, known.middle, known.high, of, "catalogue")
         unit = "" if one.unit == "1" else one.unit
         yield from compare(a.name, one.label, getattr(a, name), unit, data)

@@ -25,7 +25,9 @@ from draft.design.structure_law import leg_of_trunk, structure_laws
 from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Frame
 from draft.laws import catalogue
+from draft.laws.catalogue import MODULE, SERVO, Part
 from draft.laws.quantities import QUANTITIES
+from draft.laws.servos import servo_laws
 from draft.laws.structure import MIDDLE
 from draft.spec import Spec, tree
 from draft.spec.evaluate import Evaluator
@@ -90,6 +92,26 @@ def top_of(loft: Loft) -> tuple[Value, Value, Value]:
 def _body(written: tree.Body, link: Link, place: Frame, *numbers: Any) -> Body:
     """Body of a design: as written, its link, its place on its parent, and its other numbers."""
     return Body(written.name, written.prefix, written.parent, link, *place, *numbers)
+
+
+def _kind(actuator: ActuatorClass, part: Part | None) -> str:
+    """Family of an actuator class.
+
+    Raises:
+        ResolveError: it states another than that of its part.
+    """
+    is_servo = part is not None and catalogue.catalogue(SERVO).get(part.name) is part
+    own = SERVO if is_servo else MODULE
+    stated = actuator.kind or own
+    if is_servo and stated != own:
+        raise ResolveError(
+            Problem(
+                f"actuator '{actuator.name}' is of kind {stated}, and '{part.name}' is a servo",
+                actuator.where,
+                "omit 'kind', or start from a module",
+            )
+        )
+    return stated
 
 
 def _quantities(actuator: Actuator) -> dict[str, Value]:
@@ -244,6 +266,7 @@ class _Resolver:
         like = table.like.get(name, actuator.like)
         try:
             part = catalogue.find(like, self.plan.own) if like is not None else None
+            kind = _kind(actuator, part)
         except DraftError as error:
             problem = error.problems[0]
             given = name in table.like
@@ -255,7 +278,8 @@ class _Resolver:
 
         def sized(*_: object) -> Actuator:
             errors = self.errors.actuators.get(name)
-            return size(name, stated, part, actuator.where, self.plan.laws, errors, by_trend)
+            laws = servo_laws() if kind == SERVO else self.plan.laws
+            return size(name, stated, part, actuator.where, laws, errors, by_trend)
 
         try:
             return self.reuse.result((name, "sized"), sized, part, by_trend, names, *numbers)

@@ -18,11 +18,10 @@ from draft.fitting.scores import fold_error
 from draft.laws.actuators import laws
 from draft.laws.beyond import FILE
 from draft.laws.law import Law, Term, quantile
+from draft.laws.servos import EXCLUDED, small_actuators
 from draft.values import Array
 
-SMALL, LEGLESS = "small_actuators", "robots_without_legs"
-# Note of rows of `SMALL` that are no single actuator, or whose mass is doubtful.
-EXCLUDED = "not in fits"
+LEGLESS = "robots_without_legs"
 _STEPS = 60
 
 
@@ -46,7 +45,7 @@ def residuals(quantity: str) -> tuple[Array, Array, list[str]]:
     law = laws().trends[quantity]
     lowest = law.ranges["peak_torque"][0]
     torques, errors, makers = [], [], []
-    for row in table(SMALL):
+    for row in small_actuators():
         torque = float(row["stall_torque_Nm"] or "nan")
         if EXCLUDED in row["note"] or not torque < lowest:
             continue
@@ -104,7 +103,7 @@ def _small(quantity: str) -> Law:
         n=len(torques),
         ranges={"peak_torque": (float(torques.min()), float(torques.max()))},
         held_out={},
-        source=f"draft/fitting/data/{SMALL}.csv; docs/twins.md",
+        source="draft/laws/data/small_actuators.csv; docs/twins.md",
         fold=fold_error(errors),
         coverage_50=inside(torques, errors, makers, 0.5),
         coverage_90=inside(torques, errors, makers, 0.9),

@@ -45,69 +45,69 @@ def laws() -> dict[str, Law]:
     share = stall_share.coefficient
     heat = "time = {:.4g} excess_heat^{:.3f}, excess_heat = (torque / continuous torque)^2 - 1"
     return {
-        "stalled": _law(
+        "stalled": fitted_law(
             "stalled",
             "s",
             heat + ", stalled: continuous = " + f"{share:.3f} rated",
             ("excess_heat", "1"),
             _overload(overload, stalled=True, share=share),
             _power_law,
-            ("module", "overload_times.csv"),
+            ("module", "draft/fitting/data/overload_times.csv"),
         ),
-        "rotating": _law(
+        "rotating": fitted_law(
             "rotating",
             "s",
             heat + ", turning: continuous = rated",
             ("excess_heat", "1"),
             _overload(overload, stalled=False, share=1.0),
             _power_law,
-            ("module", "overload_times.csv"),
+            ("module", "draft/fitting/data/overload_times.csv"),
         ),
         "stall_share": stall_share,
-        "corner": _law(
+        "corner": fitted_law(
             "corner",
             "rad/s",
             "corner_speed = {:.3f} no_load_speed",
             ("no_load_speed", "rad/s"),
             _columns(corners, "no_load_speed_rad_s", "corner_speed_rad_s", _vendor, "use_in_stats"),
             _median_ratio,
-            ("vendor", "torque_speed_corners.csv"),
+            ("vendor", "draft/fitting/data/torque_speed_corners.csv"),
         ),
-        "specific_energy": _law(
+        "specific_energy": fitted_law(
             "specific_energy",
             "Wh",
             "energy = {:.4g} battery mass",
             ("battery_mass", "kg"),
             _columns(batteries, "battery_mass_kg", "battery_energy_wh", _maker),
             _median_ratio,
-            ("maker", "legged_batteries.csv"),
+            ("maker", "draft/fitting/data/legged_batteries.csv"),
         ),
-        "battery_share": _law(
+        "battery_share": fitted_law(
             "battery_share",
             "kg",
             "battery mass = {:.4g} robot mass",
             ("robot_mass", "kg"),
             _columns(batteries, "robot_mass_kg", "battery_mass_kg", _maker),
             _median_ratio,
-            ("maker", "legged_batteries.csv"),
+            ("maker", "draft/fitting/data/legged_batteries.csv"),
         ),
-        "energy_share": _law(
+        "energy_share": fitted_law(
             "energy_share",
             "Wh",
             "energy = {:.4g} robot mass",
             ("robot_mass", "kg"),
             _columns(batteries, "robot_mass_kg", "battery_energy_wh", _maker),
             _median_ratio,
-            ("maker", "legged_batteries.csv"),
+            ("maker", "draft/fitting/data/legged_batteries.csv"),
         ),
-        "electronics_power": _law(
+        "electronics_power": fitted_law(
             "electronics_power",
             "W",
             "power of electronics = {:.4g} robot mass",
             ("robot_mass", "kg"),
             _columns(standing, "robot_mass_kg", "standing_power_w", _maker),
             _median_ratio,
-            ("maker", "standing_power.csv"),
+            ("maker", "draft/fitting/data/standing_power.csv"),
         ),
     }
 
@@ -162,8 +162,8 @@ def _stall_share(rows: list[dict[str, str]]) -> Law:
     )
     formula = "continuous torque at stall = {:.3f} rated_torque"
     inputs = ("rated_torque", "N m")
-    source = ("module", "overload_times.csv")
-    return _law("stall_share", "N m", formula, inputs, points, _median_ratio, source)
+    source = ("module", "draft/fitting/data/overload_times.csv")
+    return fitted_law("stall_share", "N m", formula, inputs, points, _median_ratio, source)
 
 
 def _overload(rows: list[dict[str, str]], stalled: bool, share: float) -> Points:
@@ -200,7 +200,7 @@ def _median_ratio(x: Array, y: Array) -> Term:
     return Term(float(np.exp(np.median(np.log(y / x)))), (1.0,))
 
 
-def _law(
+def fitted_law(
     name: str,
     unit: str,
     formula: str,
@@ -208,8 +208,20 @@ def _law(
     points: Points,
     fit: Fit,
     held: tuple[str, str],
+    page: str = "docs/limits.md",
 ) -> Law:
-    """A fitted law; its errors and bands are those of held-out groups."""
+    """A fitted law; its errors and bands are those of held-out groups.
+
+    Args:
+        name: its name.
+        unit: its SI unit.
+        formula: text with places for the factor and the exponent.
+        inputs: name and unit of the input.
+        points: what it is fitted to.
+        fit: the fit.
+        held: what is held out, and the table of the points.
+        page: page of the docs.
+    """
     x, y, group = points
     term = fit(x, y)
     own = np.log(y / term([x]))
@@ -229,7 +241,7 @@ def _law(
         n=len(y),
         ranges={inputs[0]: (float(x.min()), float(x.max()))},
         held_out={kind: scores.fold_error(errors)},
-        source=f"draft/fitting/data/{table}; docs/limits.md",
+        source=f"{table}; {page}",
         fold=scores.fold_error(own),
         fold_50=scores.fold(errors, 0.5),
         fold_90=scores.fold(errors, 0.9),

@@ -116,7 +116,7 @@ def read_laws(path: Readable) -> Laws:
         DraftError: it cannot be read, or is not a coefficients file.
     """
     try:
-        return _laws(path.name, json.loads(path.read_bytes())[DEFAULT])
+        return laws_of(path.name, json.loads(path.read_bytes())[DEFAULT])
     except OSError as error:
         cause = f"cannot be read: {(error.strerror or str(error)).lower()}"
     except (ValueError, KeyError, TypeError, AttributeError):
@@ -131,14 +131,15 @@ def _shipped() -> dict[str, Any]:
 
 
 def _of_record(name: str) -> Laws:
-    return _laws(name, _shipped()[name])
+    return laws_of(name, _shipped()[name])
 
 
 for _name in SETS:
     ACTUATOR_LAWS.add(_name, partial(_of_record, _name), __name__)
 
 
-def _laws(name: str, record: dict[str, Any]) -> Laws:
+def laws_of(name: str, record: dict[str, Any]) -> Laws:
+    """Set of laws from a record of a coefficients file."""
     names, matrix = record["correlation"]["quantities"], record["correlation"]["matrix"]
     # A catalogue of one's own may state too few rated torques to fit these laws.
     shipped = {key: _shipped()[DEFAULT]["laws"][key] for key in RATED}

@@ -19,6 +19,8 @@ from draft.files import Readable
 from draft.laws.table import COLUMNS, Row, read_table
 
 FILE = Path(__file__).resolve().parent / "data" / "actuators.csv"
+# Families of actuators, of laws and limits of their own.
+MODULE, SERVO = "module", "servo"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,9 +97,17 @@ class Extremes:
     power_density: Part
 
 
-@lru_cache(maxsize=1)
-def catalogue() -> dict[str, Part]:
-    """Shipped modules by name, in the order of the file."""
+@lru_cache(maxsize=2)
+def catalogue(kind: str = MODULE) -> dict[str, Part]:
+    """Shipped modules by name, in the order of the file.
+
+    Args:
+        kind: family of actuators, "module" or "servo".
+    """
+    if kind == SERVO:
+        from draft.laws.servos import servos
+
+        return servos()
     return read_parts(FILE)[0]
 
 
@@ -146,24 +156,29 @@ def _add(parts: dict[str, Part], more: Iterable[Part]) -> None:
 
 
 def find(name: str, more: tuple[Part, ...] = ()) -> Part:
-    """Find a module of the catalogue, or of further ones, by name.
+    """Find a module or servo of the catalogue, or one of further ones, by name.
 
     Raises:
         DraftError: there is none; the message suggests the nearest name.
     """
-    parts = {**catalogue(), **{part.name: part for part in more}}
+    parts = {**catalogue(SERVO), **catalogue(), **{part.name: part for part in more}}
     if name not in parts:
         raise DraftError(f"the catalogue has no part '{name}'", suggest(name, parts, "parts"))
     return parts[name]
 
 
 @lru_cache(maxsize=8)
-def extremes(more: tuple[Part, ...] = ()) -> tuple[Extremes, dict[str, Extremes]]:
-    """Extremes of the whole catalogue with further modules, and of each family."""
-    parts = [*catalogue().values(), *more]
+def extremes(
+    more: tuple[Part, ...] = (), kind: str = MODULE
+) -> tuple[Extremes, dict[str, Extremes]]:
+    """Extremes of the whole catalogue with further modules, and of each family.
+
+    Servos of all makers are one family: their makers print few reductions.
+    """
+    parts = [*catalogue(kind).values(), *more]
     families: dict[str, list[Part]] = {}
     for part in parts:
-        families.setdefault(part.family, []).append(part)
+        families.setdefault("servos" if kind == SERVO else part.family, []).append(part)
     for name, family in [*families.items()]:
         if all(part.gear_ratio is None for part in family):
             del families[name]  # without a reduction there is nothing to compare by
@@ -180,21 +195,22 @@ class Span(NamedTuple):
 
 
 @lru_cache(maxsize=128)
-def span(quantity: str, more: tuple[Part, ...] = ()) -> Span | None:
+def span(quantity: str, more: tuple[Part, ...] = (), kind: str = MODULE) -> Span | None:
     """Span of a quantity over the catalogue with further modules; None if no source publishes it.
 
     Args:
         quantity: an attribute of `Part`.
         more: the further modules.
+        kind: family of actuators.
     """
-    values = [getattr(part, quantity, None) for part in (*catalogue().values(), *more)]
+    values = [getattr(part, quantity, None) for part in (*catalogue(kind).values(), *more)]
     known = [value for value in values if value is not None]
     return Span(min(known), median(known), max(known), len(known)) if known else None
 
 
-def aspect_range(more: tuple[Part, ...] = ()) -> tuple[float, float]:
+def aspect_range(more: tuple[Part, ...] = (), kind: str = MODULE) -> tuple[float, float]:
     """Lowest and highest length over diameter in the catalogue with further modules."""
-    known = span("aspect_ratio", more)
+    known = span("aspect_ratio", more, kind)
     return (known.low, known.high) if known is not None else (0.0, math.inf)
 
 

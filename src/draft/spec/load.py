@@ -274,7 +274,7 @@ def _actuators(file: schema.ParametersFile, source: Source) -> dict[str, Actuato
         where = source.at(path, key=True)
         like_where = source.at((*path, "like"))
         result[name] = ActuatorClass(
-            name, item.doc or "", item.like, stated, where, like_where, by_trend
+            name, item.doc or "", item.like, stated, where, like_where, by_trend, item.kind
         )
     return result
 

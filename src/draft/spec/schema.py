@@ -125,6 +125,10 @@ class _ActuatorClass(Model):
 
     doc: Sentence | None = None
     """Its purpose, in a sentence."""
+    kind: Literal["module", "servo"] | None = None
+    """Family whose laws and limits apply: `module`, motors with a small or strain-wave gear, from
+    4 N m on; or `servo`, small motors with many gears and electronics in a box. Default: that of
+    `like`, else `module`."""
     like: str | None = None
     """Part of the catalogue to start from: its measured values apply, and the trends predict only
     the effect of deviations from it."""
@@ -146,7 +150,7 @@ else:
             if one.stated
         },
     )
-STATED = tuple(name for name in ActuatorClass.model_fields if name not in ("doc", "like"))
+STATED = tuple(name for name in ActuatorClass.model_fields if name not in ("doc", "kind", "like"))
 TREND = "trend"
 
 

@@ -34,7 +34,10 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorClass:
-    """An actuator class, with its stated quantities by name; `by_trend` names those to predict."""
+    """An actuator class, with its stated quantities by name; `by_trend` names those to predict.
+
+    `kind` is None for that of `like`, else "module".
+    """
 
     name: str
     doc: str
@@ -43,6 +46,7 @@ class ActuatorClass:
     where: Location
     like_where: Location
     by_trend: frozenset[str] = frozenset()
+    kind: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from draft.design import Design
 from draft.design.plan import plan
-from draft.laws.catalogue import catalogue, span
+from draft.laws.catalogue import SERVO, catalogue, span
 from draft.laws.quantities import QUANTITIES
 from draft.spec import Spec
 from draft.spec.schema import STATED
@@ -111,8 +111,8 @@ def frictions(design: Design, actuator: str) -> list[Slider]:
 
 
 def parts(spec: Spec) -> list[str]:
-    """Options of the field `like`: modules of the catalogue and of the robot's own, or none."""
-    return [NO_PART, *catalogue(), *(part.name for part in plan(spec).own)]
+    """Options of the field `like`: none, parts of the catalogues, and those of the robot's own."""
+    return [NO_PART, *catalogue(), *catalogue(SERVO), *(part.name for part in plan(spec).own)]
 
 
 def reach(value: float) -> tuple[float, float]:

@@ -43,7 +43,7 @@ def actuator_trends(parts: Iterable[Part] | None = None) -> dict[str, Any]:
         parts: the catalogue; the shipped one where None.
     """
     rows = rows_of(catalogue().values() if parts is None else parts)
-    return {name: _fit_set(name, recipes, rows) for name, recipes in SETS.items()}
+    return {name: fit_set(name, recipes, rows, SOURCES[name]) for name, recipes in SETS.items()}
 
 
 def write(path: Path = FILE, trends: Mapping[str, object] | None = None) -> None:
@@ -51,7 +51,15 @@ def write(path: Path = FILE, trends: Mapping[str, object] | None = None) -> None
     coefficients.write(path, actuator_trends() if trends is None else trends)
 
 
-def _fit_set(name: str, recipes: tuple[Recipe, ...], rows: Rows) -> dict[str, object]:
+def fit_set(name: str, recipes: tuple[Recipe, ...], rows: Rows, origin: str) -> dict[str, object]:
+    """Fit a set of laws; returns its record for a coefficients file.
+
+    Args:
+        name: name of the set.
+        recipes: the laws.
+        rows: the modules.
+        origin: source of laws whose recipe states none.
+    """
     recipes = tuple(recipe for recipe in recipes if _fittable(recipe, rows))
     everything = np.ones(len(rows.name), dtype=bool)
     fits = fit_all(recipes, rows, everything, rows.geared)
@@ -65,13 +73,15 @@ def _fit_set(name: str, recipes: tuple[Recipe, ...], rows: Rows) -> dict[str, ob
     covered = holdout.coverage(recipes, rows)
     laws = [_law(recipe, fits[recipe.quantity], rows) for recipe in recipes]
     for quantity, formula in DERIVED.items():
+        if quantity not in in_sample:
+            continue
         unit = QUANTITIES[quantity.removesuffix("_of_size")].unit
         laws.append(Law(quantity, unit, formula, (), (), (), 0, {}, {}, ""))
     sources = {recipe.quantity: recipe.source for recipe in recipes if recipe.source}
     records = {}
     for law in laws:
         scored = _scored(law, rows, in_sample, errors, covered)
-        source = sources.get(law.name, SOURCES[name])
+        source = sources.get(law.name, origin)
         records[law.name] = replace(scored, source=source).record()
     correlation = _correlation(recipes, errors["vendor"])
     return coefficients.rounded({"laws": records, "correlation": correlation})

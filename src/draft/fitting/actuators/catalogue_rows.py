@@ -29,17 +29,19 @@ class Rows:
         name: name of each module.
         vendor: vendor of each module.
         family: family of each module.
+        every: whether rows without a published reduction are fitted and scored too.
     """
 
     log: dict[str, Array]
     name: list[str]
     vendor: list[str]
     family: list[str]
+    every: bool = False
 
     @property
     def geared(self) -> Mask:
-        """Mask of rows with a published reduction, which are fitted and scored; shape (n,)."""
-        return ~np.isnan(self.log["gear_ratio"])
+        """Mask of rows that are fitted and scored: those with a published reduction, shape (n,)."""
+        return ~np.isnan(self.log["gear_ratio"]) | self.every
 
     def has(self, *quantities: str) -> Mask:
         """Mask of rows with all of these quantities, shape (n,)."""
@@ -53,8 +55,13 @@ class Rows:
         return np.column_stack([self.log[quantity] for quantity in quantities])
 
 
-def rows_of(parts: Iterable[Part]) -> Rows:
-    """Columns of a catalogue, in its order."""
+def rows_of(parts: Iterable[Part], every: bool = False) -> Rows:
+    """Columns of a catalogue, in its order.
+
+    Args:
+        parts: the modules.
+        every: as in `Rows`.
+    """
     parts = list(parts)
 
     def known(quantity: str) -> bool:
@@ -79,4 +86,5 @@ def rows_of(parts: Iterable[Part]) -> Rows:
         [part.name for part in parts],
         [part.vendor for part in parts],
         [part.family for part in parts],
+        every,
     )

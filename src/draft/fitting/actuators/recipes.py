@@ -60,21 +60,20 @@ def _inverse_law(inputs: Array, output: Array) -> tuple[Term, ...]:
     return (Term(float(np.exp(-intercept / slope)), (float(1 / slope),)),)
 
 
-def _form(*exponents: tuple[float | None, ...], start: tuple[float, ...], **more: bool) -> Form:
+def form(*exponents: tuple[float | None, ...], start: tuple[float, ...], **more: bool) -> Form:
+    """A sum of terms with some given exponents, see `draft.fitting.forms.Form`."""
     return Form(exponents, start, **more)
 
 
-_PEAK_TORQUE = Recipe("peak_torque", ("no_load_speed", "gear_ratio"), least_squares)
+PEAK_TORQUE = Recipe("peak_torque", ("no_load_speed", "gear_ratio"), least_squares)
 _RATED_SOURCE = "fitted to the catalogue's rated torques; docs/limits.md"
 # A motor heats with the square of its torque and cools through its surface, so modules of any size
 # are rated at about one share of their peak: a free exponent errs no less on vendors held out.
 # Modules of high ratio have another share: their peak is mostly a momentary limit of the gear.
 _RATED = (
+    Recipe("rated_torque", ("peak_torque",), form((1.0,), start=(0.34,)).fit, source=_RATED_SOURCE),
     Recipe(
-        "rated_torque", ("peak_torque",), _form((1.0,), start=(0.34,)).fit, source=_RATED_SOURCE
-    ),
-    Recipe(
-        HIGH_RATIO_RATED, ("peak_torque",), _form((1.0,), start=(0.25,)).fit, source=_RATED_SOURCE
+        HIGH_RATIO_RATED, ("peak_torque",), form((1.0,), start=(0.25,)).fit, source=_RATED_SOURCE
     ),
 )
 
@@ -83,36 +82,36 @@ PAPER = (
     Recipe("volume", ("peak_torque", "gear_ratio"), least_squares),
     Recipe("aspect_ratio", ("peak_torque", "gear_ratio"), least_squares),
     Recipe("gear_ratio", ("no_load_speed",), _inverse_law),
-    _PEAK_TORQUE,
+    PEAK_TORQUE,
     # Similar rotors of one density; k is the geometric mean of J / r^4.
-    Recipe("rotor_inertia", ("radius",), _form((4.0,), start=(27.0,), robust=False).fit),
+    Recipe("rotor_inertia", ("radius",), form((4.0,), start=(27.0,), robust=False).fit),
     *_RATED,
 )
 DRAFT = (
     # A part that grows with torque (magnets, gears), and one that varies little (housing, bearings,
     # electronics).
-    Recipe("mass", ("peak_torque",), _form((1 / 3,), (1.0,), start=(0.12, 0.0067)).fit),
+    Recipe("mass", ("peak_torque",), form((1 / 3,), (1.0,), start=(0.12, 0.0067)).fit),
     # The motor, by the torque before the reduction, and the gears, by the torque after it.
     Recipe(
         "volume",
         ("peak_torque", "gear_ratio"),
-        _form((0.5, -0.5), (0.75, 0.0), start=(8e-5, 1.2e-5)).fit,
+        form((0.5, -0.5), (0.75, 0.0), start=(8e-5, 1.2e-5)).fit,
     ),
     # A larger reduction adds length, up to a limit.
     Recipe(
         "aspect_ratio",
         ("gear_ratio",),
-        _form((0.0,), (-1.0,), start=(0.9, 7.6), reciprocal=True).fit,
+        form((0.0,), (-1.0,), start=(0.9, 7.6), reciprocal=True).fit,
         reciprocal=True,
     ),
     # The motors of all modules have about the same no-load speed.
-    Recipe("gear_ratio", ("no_load_speed",), _form((-1.0,), start=(290.0,)).fit),
-    _PEAK_TORQUE,
+    Recipe("gear_ratio", ("no_load_speed",), form((-1.0,), start=(290.0,)).fit),
+    PEAK_TORQUE,
     # The rotor's share of m r^2 falls as the gears take up more of the module.
     Recipe(
         "rotor_inertia",
         ("mass", "radius", "gear_ratio"),
-        _form((1.0, 2.0, None), start=(0.2, -0.4), robust=False).fit,
+        form((1.0, 2.0, None), start=(0.2, -0.4), robust=False).fit,
     ),
     *_RATED,
 )
@@ -142,8 +141,8 @@ def fit_all(recipes: tuple[Recipe, ...], rows: Rows, train: Mask, mass_train: Ma
 def predict_all(recipes: tuple[Recipe, ...], fits: Fits, rows: Rows, test: Mask) -> Logs:
     """Predict the quantities of some modules, as logarithms, from torque, speed and reduction.
 
-    `rotor_inertia` uses the predicted mass and radius, and `rotor_inertia_of_size` the module's
-    own.
+    Where the set has a law of the rotor, `rotor_inertia` uses the predicted mass and radius, and
+    `rotor_inertia_of_size` the module's own.
     """
     actual = {quantity: rows.log[quantity][test] for quantity in rows.log}
     predicted: Logs = {}
@@ -152,10 +151,10 @@ def predict_all(recipes: tuple[Recipe, ...], fits: Fits, rows: Rows, test: Mask)
             predicted[recipe.quantity] = _ln(recipe, fits, actual)
     predicted["radius"] = (predicted["volume"] - LN_2PI - predicted["aspect_ratio"]) / 3
     predicted["length"] = predicted["radius"] + predicted["aspect_ratio"] + float(np.log(2))
-    rotor = next(recipe for recipe in recipes if recipe.quantity == "rotor_inertia")
-    predicted["rotor_inertia_of_size"] = _ln(rotor, fits, actual)
-    sizes = {quantity: predicted[quantity] for quantity in ("mass", "radius")}
-    predicted["rotor_inertia"] = _ln(rotor, fits, actual | sizes)
+    for rotor in (recipe for recipe in recipes if recipe.quantity == "rotor_inertia"):
+        predicted["rotor_inertia_of_size"] = _ln(rotor, fits, actual)
+        sizes = {quantity: predicted[quantity] for quantity in ("mass", "radius")}
+        predicted["rotor_inertia"] = _ln(rotor, fits, actual | sizes)
     return predicted
 
 

@@ -83,7 +83,7 @@ def _quadruped(random: _Random) -> dict[str, Array]:
         "front_bend": front,
         "rear_bend": rear,
         "torque": 72 * size**_POWER * random.strength(),
-        "speed": 40 / np.sqrt(size) * random.spread(0.2, 1.3),
+        "speed": 40 / np.sqrt(size) * random.spread(0.3, 1.3),
         "reduction": random.between(0.8, 2.0),
     }
 
