@@ -16,12 +16,10 @@ from mjlab.rl import RslRlVecEnvWrapper
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from draft.learn.bodies.padding import LAYOUTS, mirror_image, places, powers
+from draft.learn.bodies.padding import LAYOUTS, MOST, mirror_image, places, powers
 from draft.learn.bodies.slots import SLOTS, mirrored_slots, slots_of
 from draft.learn.task.world.access import robot_of
 from draft.learn.task.world.mirror import Flip
-
-_MOST = 100.0  # Largest padded observation; a robot that falls apart has any.
 
 
 class Mixture(VecEnv):
@@ -114,7 +112,7 @@ class _Part:
             values = seen[group]
             wide = torch.cat((values, values.new_zeros(len(values), 1)), dim=1)
             factor = sign * torch.exp(-scale @ power)
-            found[group] = (wide[:, source] * factor).clamp(-_MOST, _MOST)
+            found[group] = (wide[:, source] * factor).clamp(-MOST, MOST)
         return TensorDict(found, batch_size=seen.batch_size)
 
     def step(
