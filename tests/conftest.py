@@ -51,13 +51,14 @@ SLOW = (
     "imports/test_bad_descriptions.py",
     "model/test_mujoco_log.py",
     "reporting/test_browser.py",
-    "studio/test_studio_browser.py",
+    "studio/browser",
     "test_ray.py",
 )
 # Files that take longest, which begin: a long one at the end would run alone, on one core.
 LONGEST = (
     "test_site.py",
-    "studio/test_studio_browser.py",
+    "studio/browser/test_walking.py",
+    "studio/browser/test_view.py",
     "explore/test_resumed_search.py",
     "learn/measuring/test_surface.py",
     "cli/test_train.py",

@@ -34,6 +34,10 @@ def training() -> Iterator[None]:
             '`draft.train("my runs/a", iterations=300)` continues',
             "'draft train 'my runs/a' --iterations 300' continues",
         ),
+        (
+            '`draft.train(ROBOT, vary=["a=1:2", "b=3:4"], bodies=8, see_design=True)`',
+            "'draft train ROBOT --vary a=1:2 b=3:4 --bodies 8 --see-design'",
+        ),
         *((words, words) for words in ("`draft.compare_twin(FILE)`", "`draft.train((`")),
     ],
 )

@@ -68,8 +68,15 @@ def _command(found: re.Match[str]) -> str:
     words, options = ["draft", command, *[subcommand] * bool(subcommand)], spellings(main)
     words += map(_word, call.args)
     for one in call.keywords:
-        words += [options.get(one.arg or "", ""), _word(one.value)]
+        words += [options.get(one.arg or "", ""), *_words(one.value)]
     return f"'{' '.join(words)}'"
+
+
+def _words(value: ast.expr) -> list[str]:
+    """Return a value as words of a command line: those of a list, and none for True, of a flag."""
+    if isinstance(value, ast.List):
+        return [*map(_word, value.elts)]
+    return [] if ast.unparse(value) == "True" else [_word(value)]
 
 
 def _word(value: ast.expr) -> str:

@@ -60,6 +60,7 @@ _CRITIC = {
     "foot_contact": _Part("legs"),
 }
 LAYOUTS = {"actor": _ACTOR, "critic": _CRITIC}
+MOST = 100.0  # Largest padded observation; a robot that falls apart has any.
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from draft.learn.bodies.legged import LeggedRobot
     from draft.learn.training.ppo.loaded import Policy as Actor
 
-REMEDY = "train one on a family with `vary`, `bodies` and `see_design`"
+REMEDY = (
+    'train one on a family: `draft.train(ROBOT, vary=["NAME=LOW:HIGH"], bodies=N, see_design=True)`'
+)
 
 
 class Drive(Protocol):

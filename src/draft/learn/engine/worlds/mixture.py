@@ -16,12 +16,18 @@ from mjlab.rl import RslRlVecEnvWrapper
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from draft.learn.bodies.padding import LAYOUTS, mirror_image, of_joints, places, powers, starts
+from draft.learn.bodies.padding import (
+    LAYOUTS,
+    MOST,
+    mirror_image,
+    of_joints,
+    places,
+    powers,
+    starts,
+)
 from draft.learn.bodies.slots import SLOTS, mirrored_slots, slots_of
 from draft.learn.task.world.access import robot_of
 from draft.learn.task.world.mirror import Flip
-
-_MOST = 100.0  # Largest padded observation; a robot that falls apart has any.
 
 
 class Mixture(VecEnv):
@@ -114,7 +120,7 @@ class _Part:
             factor, first = torch.exp(-scale @ power), starts(group)
             for name in of_joints(group):
                 factor[:, first[name] + self._slots] *= signs
-            found[group] = (wide[:, source] * factor).clamp(-_MOST, _MOST)
+            found[group] = (wide[:, source] * factor).clamp(-MOST, MOST)
         return TensorDict(found, batch_size=seen.batch_size)
 
     def step(

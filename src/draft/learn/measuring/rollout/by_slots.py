@@ -9,7 +9,7 @@ import torch
 from mjlab.envs import ManagerBasedRlEnv
 from tensordict import TensorDict
 
-from draft.learn.bodies.padding import places, size, starts, units
+from draft.learn.bodies.padding import MOST, places, size, starts, units
 from draft.learn.bodies.slots import FEATURES, SLOTS, describe
 from draft.learn.policy.reduced import LegsPolicy
 from draft.learn.task.world.access import robot_of
@@ -56,7 +56,8 @@ def by_slots(policy: LegsPolicy, device: str) -> Callable[[ManagerBasedRlEnv], P
         def act(seen: TensorDict) -> torch.Tensor:
             padded = constant.copy()
             np.add.at(padded, (rows, entry), seen[_GROUP].cpu().numpy() * factor)
-            wide = policy.network(padded[:, :unused].astype(np.float32))
+            padded = padded[:, :unused].clip(-MOST, MOST)
+            wide = policy.network(padded.astype(np.float32))
             still = np.append(wide, np.zeros((len(wide), 1), wide.dtype), axis=1)
             return torch.from_numpy((still[rows, slot] * sign).astype(np.float32)).to(device)
 
