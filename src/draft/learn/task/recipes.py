@@ -157,8 +157,12 @@ ANY = Recipe(
         "velocity.missed": Change(0.6, "commands grow past what a body can do"),
         "velocity.progress": Change(1.0, "a robot that stands keeps all other rewards"),
         "rewards.linear_weight": Change(2.0, "a robot that stands keeps all other rewards"),
-        "velocity.pushed": Change(0.2, "one policy also learns to survive kicks"),
-        "rewards.linear_sigma": Change(0.35, "slow commands are followed, not ignored"),
+        "velocity.pushed": Change(0.15, "one policy also learns to survive kicks"),
+        "push.ramp": Change(
+            ((0, 1.0), (600, 2.5)), "quadrupeds that are kicked hard splay their legs, and shuffle"
+        ),
+        "observations.linear_velocity_noise": Change(0.1, "odometry of legs errs by as much"),
+        "rewards.linear_sigma": Change(0.4, "slow commands are followed, not ignored"),
         "rewards.angular_sigma": Change(1.0, "roll and pitch rates of a gait hide the turn"),
         "rewards.power_weight": Change(-0.05, "joints that shake cost power"),
     },
