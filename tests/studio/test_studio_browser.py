@@ -28,7 +28,7 @@ from draft.studio import panel  # noqa: E402
 from draft.studio.drop import HEIGHT, Drop  # noqa: E402
 from draft.studio.library import Library  # noqa: E402
 from draft.studio.server import Studio  # noqa: E402
-from tests import gamepad  # noqa: E402
+from tests import fixed, gamepad  # noqa: E402
 from tests.studio.robots import with_motor_of_its_own  # noqa: E402
 from tests.waiting import until  # noqa: E402
 
@@ -489,3 +489,25 @@ def test_sliders_show_their_effect_a_held_metric_stays_and_a_target_is_reached(
     press(tab, "Undo")
     until(lambda: tab.locator("label:has-text('● no_load_speed')").count() == 0)
     assert tab.locator("label:has-text('● thigh_length')").count() == 1
+
+
+def test_an_arm_on_a_fixed_base_is_shown_on_the_floor_and_does_not_walk(
+    tmp_path: Path, browser: Any
+) -> None:
+    studio = Studio(Library(fixed.arm(), tmp_path / "designs"), port=0, out=tmp_path / "out")
+    try:
+        made = chromium.page(browser, f"http://127.0.0.1:{studio.port}/")
+        made.wait_for_selector("label:has-text('forearm_length')")
+        (shown, _), *_ = studio._panels.values()
+        assert shown._robot.base == 0.0
+        before = mass(made)
+        push(made, "pedestal_mass", 5)
+        until(lambda: mass(made) > before)
+        picture(made, "arm")
+        turn_to(made, "Pose")
+        press(made, "Limp")
+        until(lambda: shown._drop is not None)
+        press(made, "Stop")
+        made.context.close()
+    finally:
+        studio.close()
