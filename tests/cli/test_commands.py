@@ -25,7 +25,17 @@ from tests.warm import Warm
 from tests.written import append, edit, files_below
 
 RECORD = {
-    *("name", "design", "mass_kg", "n_joints", "accepted", "findings", "parameters", "actuators"),
+    *(
+        "name",
+        "design",
+        "machine",
+        "mass_kg",
+        "n_joints",
+        "accepted",
+        "findings",
+        "parameters",
+        "actuators",
+    ),
     *("bodies",),
     *("timings_ms", "out"),
 }
