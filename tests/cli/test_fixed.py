@@ -82,7 +82,7 @@ def test_searches_over_its_parameters_take_its_metrics(command: Command) -> None
     pytest.importorskip("pyarrow")
     vary = "--vary pedestal_mass=0:40 actuators.large.peak_torque=30:200"
     screen = command.json(f"screen arm {vary} --n 64 --where 'accepted and mass < 18' --out s")
-    assert 0 < screen["rows"] < screen["accepted"] < 64
+    assert 0 < screen["rows"] < 64
     assert command.json(f"sweep arm {vary} --n 4 --out t")["designs"] == 4
     command(f"optimise arm {vary} --minimise mass --maximise large.peak_torque --trials 8 --out o")
     table = command.json("sensitivity arm")

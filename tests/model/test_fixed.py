@@ -19,6 +19,7 @@ from draft.design.loads import home_loads
 from draft.design.machine import machine
 from draft.model import picture
 from draft.model.batch import build_batch
+from draft.model.model import preview
 from draft.values import scalar
 from tests import fixed
 from tests.helpers import ids, robot
@@ -195,7 +196,7 @@ def test_one_link_takes_its_weight_times_its_lever(
     # About an axis that stays level, the link points down by the sum of both angles.
     expected = -mass * GRAVITY * length / 2 * math.cos(tilt + home)
     assert load.torque == pytest.approx(expected, abs=1e-9)
-    model = draft.model.model.preview(design).mujoco
+    model = preview(design).mujoco
     data = mujoco.MjData(model)
     data.qpos[0] = home
     mujoco.mj_forward(model, data)

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
 from draft.spec.expressions import Triple, parse
+from draft.spec.field_types import Model
 from draft.spec.links import Joint, Link, read_link
-from draft.spec.primitives.base import compile_part, read_triple
+from draft.spec.primitives.base import Written, compile_part, read_triple
 from draft.spec.primitives.fixed import FixedBase, PedestalPart
 from draft.spec.reader import Path_, Source
 
@@ -91,7 +92,8 @@ class _Expander:
 
     def run(self) -> tuple[Body, ...]:
         root, path = self.file.tree, ("tree",)
-        end_type, end = None, None
+        end_type: type[PedestalPart] | None = None
+        end: Written[Model] | None = None
         placement = Placement(None, None)
         if isinstance(root, FixedBase):
             placement = self.placement(root, path)
