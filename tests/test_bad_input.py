@@ -327,6 +327,9 @@ WORDS = {
     "fixed_base_of_two_forms": bolted(
         TIP, ("  name: trunk\n", "  name: trunk\n  pedestal: {size: [1, 1, 1], radius: 1}\n")
     ),
+    "fixed_base_of_nothing": bolted(
+        ("  children:\n    - {chain: leg, at: [0, 0, -0.2]}\n", ""),
+    ),
     "fixed_base_with_a_battery": Mistake(
         (
             (TREE, "type: root", "type: fixed"),
@@ -338,10 +341,6 @@ WORDS = {
     "payload_on_a_fixed_base": bolted(TIP, arguments=("--payload", "3")),
     "training_of_a_fixed_base": bolted(TIP, command=("train", "robot")),
     "playing_of_a_fixed_base": bolted(TIP, command=("play", "robot")),
-    "goal_that_no_fixed_base_has": bolted(
-        TIP,
-        command=("optimise", "robot", "--maximise", "top_speed", "--vary", VARIED, "--out", "out"),
-    ),
     "condition_that_no_fixed_base_has": bolted(
         TIP,
         command=(

@@ -85,6 +85,9 @@ def test_searches_over_its_parameters_take_its_metrics(command: Command) -> None
     assert 0 < screen["rows"] < 64
     assert command.json(f"sweep arm {vary} --n 4 --out t")["designs"] == 4
     command(f"optimise arm {vary} --minimise mass --maximise large.peak_torque --trials 8 --out o")
+    assert "'top_speed' is of robots on a floating base" in command.refuses(
+        f"optimise arm {vary} --maximise top_speed --out p"
+    )
     table = command.json("sensitivity arm")
     assert {one for one in OWN if one != "accepted"} <= {*table["metrics"]}
 

@@ -157,6 +157,10 @@ class _Resolver:
             trunk = _erring(_by_law(design, trunk), self.errors.trunk)
             design = replace(design, lofted=trunk)
             design = replace(design, lofted=trunk_with_battery(design, trunk))
+        elif not some(design.mass > 0):
+            cause, where = f"{spec.name} weighs nothing", spec.bodies[0].link.where
+            remedy = "add links to its base, or 'pedestal: {size: ..., mass: ...}'"
+            raise ResolveError(Problem(cause, where, remedy))
         if not judge:
             return design
         judged = replace(design, findings=inspect(design, p, self.r.invalid))
