@@ -69,9 +69,9 @@ of validity, it takes the nearest numbers that it knows, says so and tries.
 
 In this page velocities are per sqrt(g L) and rates of turn per sqrt(g / L), with the leg length L.
 Roll-outs last {seconds:g} s from noisy starts, with the delays of the training and five times its
-noise of the velocity, 0.5 m/s. An error is the mean distance of the trunk's velocity from the command, over time and over the
-roll-outs that stay up. Pushes change the velocity by up to {push:g} sqrt(g L) along x and along y,
-three times."""
+noise of the velocity, 0.5 m/s. An error is the mean distance of the trunk's velocity from the
+command, over time and over the roll-outs that stay up. Pushes change the velocity by up to
+{push:g} sqrt(g L) along x and along y, three times."""
 BODIES = """\
 {bodies} bodies of the generator, drawn with another seed than those of the training, {each} each at
 every command, and kinds that were never trained: knees that point away from each other, five joints

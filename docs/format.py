@@ -16,7 +16,7 @@ from draft.laws.quantities import QUANTITIES
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
 from draft.spec.field_types import Model
-from draft.spec.primitives import LINKS, basic, root
+from draft.spec.primitives import LINKS, basic, fixed, root
 from draft.spec.primitives.basic import LinkBase
 
 FILE = Path(__file__).parent / "format.md"
@@ -25,9 +25,10 @@ INTRODUCTION = """\
 
 <!-- Written by `python -m docs.format`; edit the docstrings below draft/spec instead. -->
 
-A robot is a folder with `parameters.yaml`, `tree.yaml`, `root.yaml` and, if it has named designs,
-`designs/NAME.yaml`. Numbers are SI; angles are radians. Frames are right-handed, x forward, y left,
-z up. Unknown keys are errors. YAML anchors, aliases and tags are not used.
+A robot is a folder with `parameters.yaml`, `tree.yaml`, `root.yaml` unless its base is fixed, and,
+if it has named designs, `designs/NAME.yaml`. Numbers are SI; angles are radians. Frames are
+right-handed, x forward, y left, z up. Unknown keys are errors. YAML anchors, aliases and tags are
+not used.
 
 ## Expressions
 
@@ -59,6 +60,19 @@ states it is what the trends give without such values of the class.
   the left. `joints` changes the range, the home position or the direction of motion of a joint of
   one copy.
 - A joint of `type: slide` moves its link along its axis, in metres. It has no actuator.
+- The root of the tree is a trunk, `type: root`, which floats and whose solid is in root.yaml; or a
+  base that is bolted to the world, `type: fixed`, as of an arm or a hand. A fixed base is at `at`
+  in the world, turned by `rpy`, and may have a `pedestal` that stands on its origin. Its robot has
+  no feet, no battery and no payload on a trunk. With joints on one of its children it is called an
+  arm, on several a hand.
+
+      tree:
+        name: base
+        type: fixed
+        pedestal: {{size: [0.2, 0.2, 0.1], mass: 4}}
+        children:
+          - {{chain: arm, at: [0, 0, 0.1]}}
+
 - A link of `type: box` is carried: a payload, a battery, a computer, a gripper. Its mass is stated,
   and is not structure: it has no segment class, does not lengthen a segment, and is not a foot. Its
   edges are along the axes of the link, which `rpy` rotates. The trunk density of the population
@@ -96,6 +110,8 @@ SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
         (
             schema.tree_file(),
             root.Trunk,
+            fixed.FixedBase,
+            fixed.Pedestal,
             LinkBase,
             *LINKS.values(),
             schema.ChainUse,
@@ -144,7 +160,7 @@ def _model(model: type[Model]) -> str:
 
 def _title(model: type[Model]) -> str:
     words = "".join(f" {c.lower()}" if c.isupper() else c for c in model.__name__)
-    return words.strip().removesuffix(" base")
+    return words.strip() if model is not LinkBase else "link"
 
 
 def _value(field: pydantic.fields.FieldInfo) -> str:

@@ -82,6 +82,20 @@ def battery(words: str) -> Mistake:
     return said(PARAMETERS, "actuators:", f"battery: {words}\nactuators:")
 
 
+def bolted(
+    *edits: tuple[str, str], arguments: tuple[str, ...] = (), command: tuple[str, ...] = ()
+) -> Mistake:
+    """Something is wrong in tree.yaml with a base that is fixed, or is asked of it."""
+    tree = (("type: root", "type: fixed"), *edits)
+    return Mistake(
+        tuple((TREE, old, new) for old, new in tree),
+        arguments,
+        placed=not arguments and not command,
+        spoil=lambda robot: (robot / ROOT).unlink(),
+        command=command,
+    )
+
+
 def overwritten(file: str, text: str) -> Callable[[Path], object]:
     return lambda robot: (robot / file).write_text(text, encoding="utf-8")
 
@@ -117,6 +131,8 @@ CLOCKWISE = "polygon: [[0, 0.1], [0.2, 0.1], [0.2, 0], [0, 0]]"
 GAP = "  gap: {value: 1, unit: m, range: [0, 2], doc: A gap.}\n"
 BACK, FRONT = "{at: -trunk_length / 2, ", "{at: trunk_length / 2, "
 RECTANGLE = "rectangle: [0.2, 0.1]}"
+VARIED = "thigh_length=0.2:0.4"
+TIP = ("site: foot", "site: tip")
 
 WORDS = {
     # keys and types
@@ -299,6 +315,58 @@ WORDS = {
             (TREE, "      link: {axis: -z, length: shank_length, segment: shank}\n", ""),
             (TREE, "      sphere: {radius: foot_radius, site: foot}\n", ""),
         )
+    ),
+    # a fixed base
+    "unknown_type_of_root": said(TREE, "type: root", "type: fxied"),
+    "fixed_base_beside_a_root_file": said(TREE, "type: root", "type: fixed"),
+    "fixed_base_inside_the_tree": said(TREE, "type: sphere", "type: fixed"),
+    "fixed_base_on_a_foot": bolted(),
+    "fixed_base_of_a_negative_mass": bolted(
+        TIP, ("  name: trunk\n", "  name: trunk\n  pedestal: {size: [1, 1, 1], mass: -2}\n")
+    ),
+    "fixed_base_of_two_forms": bolted(
+        TIP, ("  name: trunk\n", "  name: trunk\n  pedestal: {size: [1, 1, 1], radius: 1}\n")
+    ),
+    "fixed_base_of_nothing": bolted(
+        ("  children:\n    - {chain: leg, at: [0, 0, -0.2]}\n", ""),
+    ),
+    "fixed_base_with_a_battery": Mistake(
+        (
+            (TREE, "type: root", "type: fixed"),
+            (TREE, *TIP),
+            (PARAMETERS, "actuators:", "battery: {energy: 5}\nactuators:"),
+        ),
+        spoil=lambda robot: (robot / ROOT).unlink(),
+    ),
+    "payload_on_a_fixed_base": bolted(TIP, arguments=("--payload", "3")),
+    "training_of_a_fixed_base": bolted(TIP, command=("train", "robot")),
+    "playing_of_a_fixed_base": bolted(TIP, command=("play", "robot")),
+    "condition_that_no_fixed_base_has": bolted(
+        TIP,
+        command=(
+            "screen",
+            "robot",
+            "--where",
+            "mass < 9 and jump_height > 1",
+            "--vary",
+            VARIED,
+            "--out",
+            "out",
+        ),
+    ),
+    "metric_that_no_fixed_base_has": bolted(
+        TIP,
+        command=(
+            "sweep",
+            "robot",
+            "--metrics",
+            "mass",
+            "payload_rated",
+            "--vary",
+            VARIED,
+            "--out",
+            "out",
+        ),
     ),
     # actuators
     "one_stated_quantity": Mistake(

@@ -26,7 +26,7 @@ from tests.written import append, edit, files_below
 
 RECORD = {
     *("name", "design", "mass_kg", "n_joints", "accepted", "findings", "parameters", "actuators"),
-    *("bodies",),
+    *("machine", "bodies"),
     *("timings_ms", "out"),
 }
 ALWAYS = {"design.yaml", "report.json"}
@@ -234,7 +234,7 @@ def test_check_and_show_write_nothing(word: str, command: Command) -> None:
 
 def test_check_gives_the_verdict_in_its_last_line(command: Command) -> None:
     mass = draft.load("robot").resolve().mass
-    verdict = f"monoped (default): accepted, {mass:.1f} kg, 2 joints"
+    verdict = f"monoped (default): accepted, robot on 1 leg, {mass:.1f} kg, 2 joints"
     assert command("check robot").out.splitlines()[-1] == verdict
 
 

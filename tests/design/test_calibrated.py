@@ -226,4 +226,5 @@ def test_a_report_says_which_leg_length_the_trunk_has() -> None:
 
 def _held(spec: draft.Spec, leg: float) -> WrittenRoot:
     """Trunk of a spec with a stated leg length [m] for its law."""
+    assert spec.root is not None
     return replace(spec.root, leg_length=parse(leg, spec.root.where))

@@ -209,6 +209,7 @@ def test_trunk_mass_grows_with_the_cube_of_its_size(scale: float) -> None:
     )
     grown, plain = spec.resolve({"s": scale}).trunk, spec.resolve().trunk
     assert grown.mass == pytest.approx(scale**3 * plain.mass)
+    assert spec.root is not None
     assert BOX["axis"] == spec.root.axis
 
 

@@ -56,7 +56,7 @@ def test_payload_rated_and_peak_fall_by_the_payload() -> None:
 def test_the_mass_is_said_to_include_the_payload(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", "cheetah", "--payload", "10"]) == 0
     first = capsys.readouterr().out.splitlines()[0]
-    assert first.endswith("accepted, 43.6 kg with its payload of 10 kg, 12 joints")
+    assert first.endswith("accepted, robot on 4 legs, 43.6 kg with its payload of 10 kg, 12 joints")
     assert main(["show", "cheetah"]) == 0
     assert "33.6 kg, 12 joints" in capsys.readouterr().out.splitlines()[0]
     assert "payload included" in METRICS["mass"].doc

@@ -116,6 +116,7 @@ def test_an_import_weighs_what_the_law_says_at_its_own_legs() -> None:
     spec = imported(quadruped()).spec
     assert "thigh + shank of the robot that it came from" in Path("mine/root.yaml").read_text()
     own = spec.resolve()
+    assert spec.root is not None
     by_law = replace(spec, root=replace(spec.root, leg_length=None)).resolve()
     assert own.trunk.leg_length == pytest.approx(by_law.leg_length, rel=1e-9)
     assert own.body_masses() == pytest.approx(by_law.body_masses(), rel=1e-9)

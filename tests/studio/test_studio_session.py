@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,6 +22,7 @@ from draft.studio.report_page import report_page
 from draft.studio.session import GESTURE, Point, Session
 from draft.studio.skins import skins
 from draft.values import scalar
+from tests import fixed
 from tests.studio.robots import with_motor_of_its_own
 
 
@@ -336,3 +339,27 @@ def test_rated_torque_is_on_the_card_of_actuators() -> None:
     assert plots.short(scalar(design.actuators["leg"].rated_torque)) in row
     low, high = design.actuator_bands()["leg"]["rated_torque"]
     assert f"{scalar(low):.1f}–{scalar(high):.1f}" in row
+
+
+@pytest.mark.parametrize("spec", [fixed.arm, fixed.hand])
+def test_a_robot_on_a_fixed_base_is_drawn_where_it_is_bolted_and_droops(
+    tmp_path: Path, spec: Callable[[], draft.Spec]
+) -> None:
+    s = Session(Library(spec(), tmp_path))
+    s.pin()
+    for text in (
+        cards.head(s),
+        cards.masses(s),
+        trend_cards.trends(s),
+        trend_cards.torque_speed(s),
+    ):
+        assert text
+        assert "nan" not in text
+    joints = np.array([scalar(joint.home) for joint in s.design.joints.values()])
+    drop = Drop(s.shown, joints, 0.0, held=False)
+    drop.advance(0.2)
+    assert drop.data.xpos[1] == pytest.approx(s.shown.mujoco.body_pos[1])
+    assert np.abs(drop.data.qpos - joints).max() > 0.02
+    held = Drop(s.shown, joints, 0.0, held=True)
+    held.advance(0.2)
+    assert held.data.qpos == pytest.approx(joints, abs=0.01)

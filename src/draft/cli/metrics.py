@@ -127,6 +127,8 @@ def _print(
         metric = find(name)
         unit = "" if metric.unit in ("1", "bool") else metric.unit
         shown = _shown(value) if metric.unit != "bool" else ("yes" if value else "no")
+        if name == "accepted" and value and not design.judged:
+            shown = "not judged"
         if name == "hold_time" and math.isinf(value):
             shown = "no limit"
         table.add_row(Text(name, style="bold"), shown, unit, metric.doc)

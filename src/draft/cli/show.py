@@ -17,6 +17,7 @@ from draft.design.bands import actuator_bands
 from draft.design.report import actuator_rows, mass_parts
 from draft.design.structure_law import structure_laws, trunk_words
 from draft.design.widened import mass_with_band
+from draft.spec.primitives.root import TrunkPart
 
 BAR = 28
 
@@ -40,7 +41,8 @@ def main(
     if resolved.spec.doc:
         out.print(Text(resolved.spec.doc, style="dim"))
     out.print(Group("", _tree(resolved), "", _actuators(resolved), "", _masses(resolved)))
-    out.print(_trunk(resolved))
+    if resolved.lofted is not None:
+        out.print(_trunk(resolved, resolved.lofted))
     print_limits(resolved)
     print_findings(resolved)
     if not resolved.findings:
@@ -129,13 +131,13 @@ def _actuator(actuator: Actuator) -> Table:
     return table
 
 
-def _trunk(design: Design) -> Text:
+def _trunk(design: Design, trunk: TrunkPart) -> Text:
     """Return the law that the trunk weighs by, and how far such totals are off."""
-    if design.trunk.density_stated:
+    if trunk.density_stated:
         return Text("trunk by its stated density\n", style="dim")
     laws = structure_laws(design)
     error = f"totals of held-out {laws.name}s err by {laws.held_out_total:.2f} x"
-    return Text(f"trunk by {trunk_words(design)}\n{error}\n", style="dim")
+    return Text(f"trunk by {trunk_words(design, trunk)}\n{error}\n", style="dim")
 
 
 def _masses(design: Design) -> Table:

@@ -284,8 +284,8 @@ def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
             by_trend[segment.trend] = so_far + segment.mass * segment.copies
     for trend, mass in by_trend.items():
         spreads.append(Spread(mass, population.segments[trend].sigma))
-    if design.trunk.density_stated:
-        known = known + design.trunk.mass
+    if design.lofted is None or design.lofted.density_stated:
+        known = known + design.base_mass
     else:
-        spreads.append(Spread(design.trunk.mass, population.trunk_law.sigma))
+        spreads.append(Spread(design.lofted.mass, population.trunk_law.sigma))
     return known, spreads

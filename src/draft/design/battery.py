@@ -70,13 +70,13 @@ def _stated_mass(design: Design) -> Value:
     return stated["energy"] / limits().specific_energy.coefficient
 
 
-def trunk_with_battery(design: Design) -> TrunkPart:
+def trunk_with_battery(design: Design, trunk: TrunkPart) -> TrunkPart:
     """Trunk in which a stated battery replaces the usual one; at least as heavy as the battery.
 
     Args:
-        design: the design, its trunk as the trend or a stated density gives it.
+        design: the design.
+        trunk: its trunk as the trend or a stated density gives it.
     """
-    trunk = design.trunk
     if not design.battery_stated or trunk.density_stated:
         return trunk
     stated = _stated_mass(design)

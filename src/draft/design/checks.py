@@ -27,6 +27,7 @@ KINDS: dict[str, str] = {
     "actuator_overlap": "two consecutive actuators occupy the same space at every joint angle",
     "wrong_unit": "a stated value far outside what was built, which another unit explains",
     "cannot_stand": "standing in the home pose needs more than the peak torque of a joint",
+    "cannot_hold": "holding a fixed base's home pose needs more than the peak torque of a joint",
     "no_legs": "no limb reaches the ground: the structure trends are those of robots with legs",
     "not_physical": "an invalid number: not finite, a length of zero, outside its bounds",
     "aspect_ratio": "length over diameter outside the catalogue's",
@@ -39,8 +40,8 @@ KINDS: dict[str, str] = {
     "limb_overlap": "two limbs overlap in the neutral pose",
     "uneven_feet": "feet at different heights in the home pose",
     "outside_data": "a trend is used outside the range of its data",
-    "thermal": "standing in the home pose needs more than the rated torque of a joint",
-    "below_floor": "a part below the feet in the home pose",
+    "thermal": "standing in or holding the home pose needs more than the rated torque of a joint",
+    "below_floor": "a part below the feet in the home pose, or of a fixed base below the floor",
     "off_tip": "links drawn longer than the distance between their joints, which counts",
     "trunk_section": "a section of the trunk beside the others by more than its own width",
     "unused_class": "an actuator class that no joint uses",
@@ -53,7 +54,7 @@ KINDS: dict[str, str] = {
 ERRORS = frozenset(
     (
         *("torque", "torque_density", "power_density", "actuator_overlap", "not_physical"),
-        *("wrong_unit", "cannot_stand", "unstable_servo"),
+        *("wrong_unit", "cannot_stand", "cannot_hold", "unstable_servo"),
     )
 )
 
@@ -87,9 +88,9 @@ def check(*, error: bool = False) -> Callable[[Find], Find]:
             \"\"\"The trunk is heavier than all the rest.\"\"\"
             limit = design.mass / 2
             text = "the trunk weighs {value}, more than half of the robot, {limit}"
-            mask = design.trunk.mass > limit
+            mask = design.base_mass > limit
             yield from note(
-                "top_heavy", "trunk", mask, text, "a rule of ours", design.trunk.mass, limit, "kg"
+                "top_heavy", "trunk", mask, text, "a rule of ours", design.base_mass, limit, "kg"
             )
 
     Args:

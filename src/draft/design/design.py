@@ -82,7 +82,8 @@ class Body(NamedTuple):
     @property
     def carries(self) -> bool:
         """Whether the end of its link is carried, not part of a segment."""
-        return self.link.end is not None and not self.link.end.of_segment
+        end = self.link.end
+        return self.parent is not None and end is not None and not end.of_segment
 
     @property
     def motor_geom(self) -> Geom | None:
@@ -197,7 +198,7 @@ class Design:
         parameters: value of every parameter, by name.
         actuators: every actuator class, by name.
         bodies: the tree, depth first; body 0 is the trunk.
-        trunk: the lofted trunk.
+        lofted: the trunk; None for a fixed base.
         segments: structural masses by segment.
         findings: findings of the design filter.
         battery_stated: stated energy [Wh] and mass [kg] of the battery, by name.
@@ -211,7 +212,7 @@ class Design:
     parameters: Mapping[str, Value]
     actuators: Mapping[str, Actuator]
     bodies: tuple[Body, ...]
-    trunk: TrunkPart
+    lofted: TrunkPart | None
     segments: tuple[SegmentMass, ...]
     findings: tuple[Finding, ...]
     battery_stated: Mapping[str, Value] = field(default_factory=dict)
@@ -292,10 +293,39 @@ class Design:
         own = self.label not in ("default", "custom")
         return f"{self.name}:{self.label}" if own else self.name
 
+    @property
+    def floating(self) -> bool:
+        """Whether its base floats; else it is bolted to the world."""
+        return self.spec.floating
+
+    @property
+    def trunk(self) -> TrunkPart:
+        """The lofted trunk.
+
+        Raises:
+            DraftError: the base is fixed, and has none.
+        """
+        if self.lofted is None:
+            raise DraftError(f"{self.reference} has no trunk: its base is fixed", "use `base_mass`")
+        return self.lofted
+
+    @cached_property
+    def feet(self) -> tuple[int, ...]:
+        """Indices of the bodies on whose ends it may stand; a fixed base has none."""
+        if not self.floating:
+            return ()
+        ends = ((i, body.link.end) for i, body in enumerate(self.bodies))
+        return tuple(i for i, end in ends if end is not None and end.is_foot)
+
+    @property
+    def base_mass(self) -> Value:
+        """Mass of the trunk, or of the fixed base [kg], without what is attached to it."""
+        return self.bodies[0].end_mass if self.lofted is None else self.lofted.mass
+
     @cached_property
     def structure_mass(self) -> Value:
-        """Mass of the trunk, the members, and the ends that are part of a segment [kg]."""
-        return self.trunk.mass + g.total(s.mass * s.copies for s in self.segments)
+        """Mass of the base, the members, and the ends that are part of a segment [kg]."""
+        return self.base_mass + g.total(s.mass * s.copies for s in self.segments)
 
     @cached_property
     def actuator_mass(self) -> Value:
@@ -370,11 +400,12 @@ class Design:
     def body_masses(self) -> dict[str, Value]:
         """Mass of every body [kg]."""
         masses = {body.name: body.mass for body in self.bodies}
-        masses[self.bodies[0].name] = masses[self.bodies[0].name] + self.trunk.mass
+        if self.lofted is not None:
+            masses[self.bodies[0].name] = masses[self.bodies[0].name] + self.lofted.mass
         return masses
 
     def frames(self, home: bool = False) -> list[Frame]:
-        """Origin [m] and rotation of every body in the frame of the trunk.
+        """Origin [m] and rotation of every body in the frame of the trunk; of the world if fixed.
 
         Args:
             home: whether the joints are in the home pose; else all are at zero.
@@ -383,14 +414,14 @@ class Design:
         return [pose.frame(i) for i in range(len(self.bodies))]
 
     def lowest(self, home: bool = False) -> Value:
-        """Distance from the trunk's origin down to the lowest point of the feet [m].
+        """Height of the base's origin above the floor [m]: standing on its feet, or as bolted.
 
-        A robot without feet stands on its lowest solid.
+        A floating robot without feet stands on its lowest solid.
 
         Args:
             home: whether the joints are in the home pose; else all are at zero.
         """
-        return lowest(self, home)
+        return lowest(self, home) if self.floating else self.bodies[0].position[2]
 
     @verb
     def build(self) -> Model:

@@ -60,7 +60,7 @@ def sample_errors(design: Design, count: int, seed: int = 0, *others: Design) ->
         if kind is not None
     }
     trunk: Value = 0.0
-    if not all(one.trunk.density_stated for one in designs):
+    if not all(one.lofted is None or one.lofted.density_stated for one in designs):
         trunk = _normal(rng, count)[:, 0] * population.trunk_law.sigma
     return LawErrors(actuators, segments, trunk)
 

@@ -27,6 +27,7 @@ from draft.design.solids import Pose
 from draft.design.structure_law import leg_of_trunk, structure_laws
 from draft.errors import Problem, ResolveError, suggest
 from draft.laws.structure import Population
+from draft.spec.primitives.root import TrunkPart
 from draft.values import (
     Mask,
     Value,
@@ -58,6 +59,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
     _check_allow(design)
     home = Pose(design, home=True)
     drives, reuse = used(design), plan.reuse(design.count)
+    trunks = [] if design.lofted is None else [design.lofted]
     found = [
         *_physical(design, invalid),
         *each("actuator", partial(actuator, own=plan.own), drives, reuse),
@@ -65,12 +67,12 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         *filter_units.robot(design, plan),
         *actuator_overlaps(design, plan),
         *each("segment", partial(_segment, plan.population), design.segments, reuse),
-        *_trunk(design),
+        *(found for trunk in trunks for found in _trunk(design, trunk)),
         *_whole(design, plan, home),
         *_thermal(design),
         *limb_overlaps(design, plan),
         *below_floor(design, plan, home),
-        *each("sections", partial(sections, design), [design.trunk.loft], reuse),
+        *each("sections", partial(sections, design), [one.loft for one in trunks], reuse),
         *off_tip(design, plan),
         *unused(design),
         *extended(design),
@@ -151,13 +153,13 @@ def _segment(population: Population, segment: SegmentMass) -> Iterator[Finding]:
     )
 
 
-def _trunk(design: Design) -> Iterator[Finding]:
+def _trunk(design: Design, trunk: TrunkPart) -> Iterator[Finding]:
     """Compare leg length and trunk with those that the calibrated law was fitted to."""
-    population, leg = structure_laws(design), leg_of_trunk(design)
+    population, leg = structure_laws(design), leg_of_trunk(design, trunk)
     if leg is None:
         return
     law = population.calibrated
-    values = {"volume": design.trunk.loft.volume, "leg_length": leg}
+    values = {"volume": trunk.loft.volume, "leg_length": leg}
     words = {"volume": "volume {value} of the trunk", "leg_length": "leg length {value}"}
     for (name, value), unit in zip(values.items(), law.input_units, strict=True):
         low, high = law.ranges[name]
@@ -177,8 +179,10 @@ def _trunk(design: Design) -> Iterator[Finding]:
 def _whole(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
     """Compare legs, actuator share and total mass with the population."""
     population = plan.population
-    ends = (body.link.end for body in design.bodies)
-    if not any(end is not None and end.is_foot for end in ends):
+    if not design.floating:
+        yield from _legged_trends(design, population)
+        return
+    if not design.feet:
         yield from note(
             "no_legs",
             design.name,
@@ -227,8 +231,25 @@ def _whole(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
     )
 
 
+def _legged_trends(design: Design, population: Population) -> Iterator[Finding]:
+    """Links of a fixed base whose masses follow from robots with legs."""
+    names = [segment.bodies[0] for segment in design.segments if segment.trend is not None]
+    if names:
+        yield from note(
+            "outside_data",
+            design.name,
+            True,
+            f"the trends of surveyed {population.name}s, robots with legs, give the masses of the "
+            f"links of this fixed base, such as '{names[0]}'; state 'mass' of each to replace them",
+            f"survey of {population.name}s",
+        )
+
+
 def _thermal(design: Design) -> Iterator[Finding]:
-    """Compare the torques of standing with the rated and the peak ones."""
+    """Compare the torques of standing, or of a fixed base's joints, with rated and peak ones."""
+    kind, doing, what = "cannot_stand", "standing in", "robot"
+    if not design.floating:
+        kind, doing, what = "cannot_hold", "holding", "links"
     loads = home_loads(design)
     shares = [abs(load.torque) / load.actuator.peak_torque for load in loads]
     worst = maximum(0.0, *shares)
@@ -240,11 +261,11 @@ def _thermal(design: Design) -> Iterator[Finding]:
         limits = both(share > ROUNDING, both(share >= worst, negate(refused)))
         refused = either(refused, limits)
         yield from note(
-            "cannot_stand",
+            kind,
             design.name,
             limits,
-            f"standing in the home pose takes {{value}} at '{joint}', above the peak torque "
-            f"{{limit}} of '{load.actuator.name}': the motors cannot hold the robot at all",
+            f"{doing} the home pose takes {{value}} at '{joint}', above the peak torque "
+            f"{{limit}} of '{load.actuator.name}': the motors cannot hold the {what} at all",
             "statics of the home pose",
             torque,
             peak,
@@ -254,7 +275,7 @@ def _thermal(design: Design) -> Iterator[Finding]:
             "thermal",
             joint,
             torque > rated * ROUNDING,
-            f"standing in the home pose takes {{value}} at '{joint}', above the rated torque "
+            f"{doing} the home pose takes {{value}} at '{joint}', above the rated torque "
             f"{{limit}} of '{load.actuator.name}': it gets too hot in time",
             f"statics of the home pose; rated torque {origin.detail or origin.kind}",
             torque,

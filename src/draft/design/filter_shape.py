@@ -11,9 +11,9 @@ from draft import geometry as g
 from draft.design.design import Design
 from draft.design.findings import Finding, note
 from draft.design.plan import Plan
-from draft.design.solids import Pose, Solid, depth, foot_depths
+from draft.design.solids import Pose, Solid, depth, foot_depths, trunk_depths
 from draft.spec.primitives.loft import Loft
-from draft.values import Value, is_array, maximum, minimum, some
+from draft.values import Value, maximum, minimum, some
 
 # Reported difference of the heights of feet: share of the deepest, and at least [m].
 EVEN, LEAST_UNEVEN = 0.02, 0.005
@@ -43,22 +43,23 @@ def feet(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
 
 
 def below_floor(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
-    """Compare the lowest points of all parts with the feet, in the home pose."""
+    """Compare the lowest points of all parts with the feet, or the floor of a fixed base."""
     reuse = plan.reuse(design.count)
     distinct = reuse.result("distinct", lambda: _distinct(design, plan))
-    feet = foot_depths(design, home, distinct)
+    feet, of = foot_depths(design, home, distinct), "feet"
+    if not design.floating:
+        feet, of = [0.0], "floor"
     if not feet:
         return
     floor = maximum(*feet)
     limit = floor + maximum(EVEN * abs(floor), LEAST_UNEVEN)
-    trunk = design.trunk.loft.vertices[:, 2].min(axis=0)
     for i in distinct:
         body, parts = design.bodies[i], home.solids(i)
         # The spheres around solids tell at once that most are above the floor.
         near = some(reuse.result(("reach", i), _reach, parts) > limit)
         depths = [depth(part) for part in parts] if near else []
         if body.parent is None:
-            depths.append(-trunk if is_array(trunk) else -float(trunk))
+            depths += trunk_depths(design)
         if not depths:
             continue
         lowest = maximum(*depths)
@@ -66,7 +67,7 @@ def below_floor(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
             "below_floor",
             body.name,
             lowest > limit,
-            f"a part of '{body.name}' is {{value}} below the feet in the home pose",
+            f"a part of '{body.name}' is {{value}} below the {of} in the home pose",
             "geometry of the home pose",
             1000.0 * (lowest - floor),
             None,
@@ -129,10 +130,11 @@ def off_tip(design: Design, plan: Plan) -> Iterator[Finding]:
 
 def sections(design: Design, loft: Loft) -> Iterator[Finding]:
     """Compare the place of each section of the trunk with its own width."""
-    if all(s.offset is None and s.polygon is None for s in design.spec.root.sections):
+    written = design.spec.root
+    if written is None or all(s.offset is None and s.polygon is None for s in written.sections):
         return  # All are centred on the axis of the loft.
     points = loft.vertices.reshape(loft.sections, loft.corners, *loft.vertices.shape[1:])
-    across = [k for k, name in enumerate("xyz") if name != design.spec.root.axis]
+    across = [k for k, name in enumerate("xyz") if name != written.axis]
     low, high = points.min(axis=1)[:, across], points.max(axis=1)[:, across]
     centres, widths = (low + high) / 2, high - low
     for i in range(loft.sections):
@@ -155,9 +157,7 @@ def _uneven(design: Design, plan: Plan) -> list[int]:
     kinds = {segment.label: segment.kind for segment in design.segments}
     feet: list[int] = []
     copies: set[object] = set()
-    for i, body in enumerate(design.bodies):
-        if body.link.end is None or not body.link.end.is_foot:
-            continue
+    for i in design.feet:
         path = [i]
         while parent := design.bodies[path[-1]].parent:
             path.append(parent)

@@ -20,6 +20,7 @@ from draft.laws.catalogue import span
 from draft.laws.limits import limits
 from draft.laws.quantities import CORNER, QUANTITIES
 from draft.laws.structure import Population
+from draft.spec.primitives.root import TrunkPart
 from draft.values import (
     Value,
     both,
@@ -111,7 +112,8 @@ def robot(design: Design, plan: Plan) -> Iterator[Finding]:
     segment = partial(_segment, plan.population)
     yield from each("units of segment", segment, design.segments, reuse)
     yield from _masses(design, plan)
-    yield from _trunk(design, plan)
+    if design.lofted is not None:
+        yield from _trunk(design.lofted, design.bodies[0].name, plan.population)
     yield from _battery(design)
     yield from _ranges(design)
 
@@ -203,10 +205,8 @@ def _masses(design: Design, plan: Plan) -> Iterator[Finding]:
                 yield from compare(body.name, "mass", part.mass, "kg", data)
 
 
-def _trunk(design: Design, plan: Plan) -> Iterator[Finding]:
+def _trunk(trunk: TrunkPart, name: str, population: Population) -> Iterator[Finding]:
     """Compare the volume and a stated density of the trunk with those of surveyed robots."""
-    population, trunk = plan.population, design.trunk
-    name = design.bodies[0].name
     low, high = population.trunk.range
     of = f"{population.trunk.n} surveyed {population.name}s"
     middle = math.sqrt(low * high)

@@ -129,9 +129,7 @@ def runs_of_legs(design: Design) -> list[list[tuple[int, ...]]]:
 def _find_runs(design: Design) -> list[list[tuple[int, ...]]]:
     kinds = {segment.label: segment.kind for segment in design.segments}
     by_knee: dict[int, list[int]] = {}
-    for i, body in enumerate(design.bodies):
-        if body.link.end is None or not body.link.end.is_foot:
-            continue
+    for i in design.feet:
         path = [i]
         while (parent := design.bodies[path[0]].parent) is not None:
             path.insert(0, parent)
@@ -212,7 +210,6 @@ def _joints(
         origin, rotation = frames[k]
         axis = g.rotate(rotation, bodies[k].joint_axis)
         r = g.subtract(foot, origin)
-        mass, x, y = moments[k]
         found.append(
             LegJoint(
                 body=k,
@@ -221,10 +218,35 @@ def _joints(
                 angle=angles.get(k, 0.0),
                 lift=axis[0] * r[1] - axis[1] * r[0],
                 sweep=axis[1] * r[2] - axis[2] * r[1],
-                hang=axis[0] * (y - mass * origin[1]) - axis[1] * (x - mass * origin[0]),
+                hang=_hang(axis, origin, moments[k]),
             )
         )
     return tuple(found)
+
+
+def held_joints(design: Design) -> tuple[LegJoint, ...]:
+    """Hinges of a fixed base in the home pose, each alone; no floor lifts them."""
+    frames = dict(enumerate(design.frames(home=True)))
+    moments = _moments(design, frames)
+    return tuple(
+        LegJoint(
+            body=k,
+            names=(body.prefix + joint.name,),
+            actuator=design.actuators[joint.actuator] if joint.actuator else None,
+            angle=joint.home,
+            lift=0.0,
+            sweep=0.0,
+            hang=_hang(g.rotate(frames[k][1], joint.axis), frames[k][0], moments[k]),
+        )
+        for k, body in enumerate(design.bodies)
+        if (joint := body.joint) is not None and not joint.slide
+    )
+
+
+def _hang(axis: Vector, origin: Vector, moment: Vector) -> Value:
+    """First moment of the bodies below a hinge, sum of m dz/dq [kg m/rad]."""
+    mass, x, y = moment
+    return axis[0] * (y - mass * origin[1]) - axis[1] * (x - mass * origin[0])
 
 
 def _moments(design: Design, frames: Mapping[int, Frame]) -> dict[int, Vector]:

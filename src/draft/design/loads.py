@@ -1,4 +1,4 @@
-"""Static torques of the joints of the legs, in the crouch and in the home pose.
+"""Static torques of the joints of legs, in the crouch and at home, and of those on a fixed base.
 
 The robot stands on all its legs. The floor pushes up with the same force on every foot, at the end
 of the last link of the leg. The position of the centre of mass between the feet is neglected, and
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from draft.design.actuators import Actuator
 from draft.design.cached import once
 from draft.design.design import Design
-from draft.design.legs import GRAVITY, Leg, LegJoint, home_joints, legs, runs_of_legs
+from draft.design.legs import GRAVITY, Leg, LegJoint, held_joints, home_joints, legs, runs_of_legs
 from draft.values import Value
 
 
@@ -58,7 +58,9 @@ def loads(design: Design) -> tuple[LegLoad, ...]:
 
 @once
 def home_loads(design: Design) -> tuple[Load, ...]:
-    """Static loads of the driven joints of all kinds of leg in the home pose."""
+    """Static loads of the driven joints in the home pose: of the legs, or on a fixed base."""
+    if not design.floating:
+        return tuple(_loads(design, held_joints(design), 1))
     kinds = runs_of_legs(design)
     n = sum(len(runs) for runs in kinds)
     return tuple(load for runs in kinds for load in _loads(design, home_joints(design, runs), n))

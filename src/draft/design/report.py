@@ -11,6 +11,7 @@ from draft.design.bands import SHARES, actuator_bands
 from draft.design.battery import battery
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.electronics import electronics
+from draft.design.machine import machine
 from draft.design.plan import plan
 from draft.design.structure_law import leg_of_trunk, structure_laws, trunk_words
 from draft.errors import DraftError
@@ -41,6 +42,7 @@ def report(design: Design) -> dict[str, Any]:
     return {
         "name": design.name,
         "design": design.label,
+        "machine": machine(design),
         "folder": design.spec.origin,
         "population": population.name,
         "mass_kg": design.mass,
@@ -57,8 +59,9 @@ def report(design: Design) -> dict[str, Any]:
             name: actuator_record(actuator, plan(design.spec).own) | {"used": name in used}
             for name, actuator in design.actuators.items()
         },
-        "battery": _battery(design),
-        "electronics": _electronics(design),
+        # A fixed base has no trunk with these; it draws mains power.
+        "battery": _battery(design) if design.floating else None,
+        "electronics": _electronics(design) if design.floating else None,
         "trunk": _trunk(design, population),
         "end_density_kg_m3": _end_density(population),
         "segments": [_segment(segment, population) for segment in design.segments],
@@ -78,6 +81,7 @@ def summary(design: Design) -> dict[str, Any]:
         {
             "name": design.name,
             "design": design.label,
+            "machine": machine(design),
             "mass_kg": design.mass,
             "n_joints": len(design.joints),
             "accepted": design.accepted,
@@ -210,7 +214,7 @@ def mass_parts(design: Design) -> list[tuple[str, float]]:
         count = sum(body.actuator is actuator for body in design.bodies)
         if count:
             rows.append((f"{count} × actuator {name}", float(actuator.mass * count)))
-    rows.append((design.bodies[0].name, scalar(design.trunk.mass)))
+    rows.append((design.bodies[0].name, scalar(design.base_mass)))
     links = {body.name: body.link.name for body in design.bodies}
     of_label: dict[str, list[tuple[SegmentMass, int]]] = {}
     for segment in design.segments:
@@ -294,17 +298,19 @@ def _of_law(law: Law | None) -> dict[str, Any]:
     return {"fit": law.formula, "n": law.n, **held_out, "source": law.source}
 
 
-def _trunk(design: Design, population: Population) -> dict[str, Any]:
-    trunk = design.trunk
+def _trunk(design: Design, population: Population) -> dict[str, Any] | None:
+    trunk = design.lofted
+    if trunk is None:
+        return None
     origin: dict[str, Any] = {"origin": "stated"}
     if not trunk.density_stated:
         origin = {
             "origin": "trend",
-            "fit": trunk_words(design),
+            "fit": trunk_words(design, trunk),
             "n": population.trunk_law.n,
             "source": population.source,
         }
-    leg = leg_of_trunk(design)
+    leg = leg_of_trunk(design, trunk)
     if leg is not None:
         origin["inputs"] = {"volume": trunk.loft.volume, "leg_length": leg}
         origin["leg_length_origin"] = "design" if trunk.leg_length is None else "stated"

@@ -60,13 +60,14 @@ def resolve(
         return _Resolver(spec, p, table, errors).run(label, values, judge)
 
 
-def trunk_by_law(design: Design) -> TrunkPart:
+def _by_law(design: Design, trunk: TrunkPart) -> TrunkPart:
     """Trunk of the density that the law that holds for it gives; a stated density stays.
 
     Args:
-        design: the design, its trunk weighed by the published median.
+        design: the design.
+        trunk: its trunk, weighed by the published median.
     """
-    trunk, leg = design.trunk, leg_of_trunk(design)
+    leg = leg_of_trunk(design, trunk)
     if leg is None:
         return trunk
     volume = trunk.loft.volume
@@ -140,8 +141,10 @@ class _Resolver:
             else:
                 self.parameter(spec.parameters[name])
         density = p.population.trunk_density
-        trunk = self.read("trunk", lambda: make_trunk(spec.root, density, self.r), p.root_reads)
-        if spec.payload is not None:
+        trunk = None
+        if (root := spec.root) is not None:
+            trunk = self.read("trunk", lambda: make_trunk(root, density, self.r), p.root_reads)
+        if spec.payload is not None and trunk is not None:
             top = self.reuse.result("top", top_of, trunk.loft)
             self.env.update(zip(PLACE, top, strict=True))
         links = [
@@ -163,7 +166,7 @@ class _Resolver:
             parameters={name: self.env[name] for name in spec.parameters},
             actuators={name: self.actuators[name] for name in spec.actuators},
             bodies=bodies,
-            trunk=trunk,
+            lofted=trunk,
             segments=segments,
             findings=(),
             battery_stated={
@@ -172,8 +175,14 @@ class _Resolver:
             },
             electronics_stated=self.electronics(spec.electronics_power),
         )
-        design = replace(design, trunk=_erring(trunk_by_law(design), self.errors.trunk))
-        design = replace(design, trunk=trunk_with_battery(design))
+        if trunk is not None:
+            trunk = _erring(_by_law(design, trunk), self.errors.trunk)
+            design = replace(design, lofted=trunk)
+            design = replace(design, lofted=trunk_with_battery(design, trunk))
+        elif not some(design.mass > 0):
+            cause, where = f"{spec.name} weighs nothing", spec.bodies[0].link.where
+            remedy = "add links to its base, or 'pedestal: {size: ..., mass: ...}'"
+            raise ResolveError(Problem(cause, where, remedy))
         if not judge:
             return design
         judged = replace(design, findings=inspect(design, p, self.r.invalid))

@@ -142,7 +142,7 @@ def solid(geom: Geom, frame: Frame) -> Solid:
 
 
 class Pose:
-    """Frames and solids of the bodies of a design, in the frame of the trunk.
+    """Frames and solids of the bodies, in the frame of the trunk, or of the world on a fixed base.
 
     Args:
         design: the design.
@@ -152,7 +152,12 @@ class Pose:
     def __init__(self, design: Design, home: bool) -> None:
         self._bodies, self._home = design.bodies, home
         self._reuse = plan(design.spec).reuse(design.count)
-        self._frames: dict[int, Frame] = {0: g.ORIGIN}
+        self._frames: dict[int, Frame] = {0: g.ORIGIN if design.floating else self._base()}
+
+    def _base(self) -> Frame:
+        """Frame of a fixed base in the world."""
+        of = self._bodies[0].position, self._bodies[0].rotation
+        return self._reuse.result(("frame", self._home, 0), lambda *frame: frame, *of)
 
     def frame(self, body: int) -> Frame:
         """Origin [m] and rotation of a body by its index."""
@@ -372,28 +377,32 @@ def depth(part: Solid) -> Value:
 def lowest(design: Design, home: bool) -> Value:
     """Distance from the trunk's origin down to the lowest point of the feet [m].
 
-    Feet are the ends with a site on which a robot may stand. A robot without feet stands on its
-    lowest solid.
+    A robot without feet stands on its lowest solid.
     """
     pose, bodies = Pose(design, home), range(len(design.bodies))
     feet = foot_depths(design, pose, bodies)
     if feet:
         return maximum(*feet)
-    trunk = -1.0 * design.trunk.loft.vertices[:, 2].min(axis=0)
     depths = [depth(part) for i in bodies for part in pose.solids(i)]
-    return maximum(trunk if is_array(trunk) else float(trunk), *depths)
+    return maximum(*trunk_depths(design), *depths)
+
+
+def trunk_depths(design: Design) -> list[Value]:
+    """Distance from the trunk's origin down to its lowest point [m]; none for a fixed base."""
+    if design.lofted is None:
+        return []
+    down = -1.0 * design.lofted.loft.vertices[:, 2].min(axis=0)
+    return [down if is_array(down) else float(down)]
 
 
 def foot_depths(design: Design, pose: Pose, bodies: Iterable[int]) -> list[Value]:
     """Distances from the trunk's origin down to the lowest point of each foot [m].
-
-    Feet are the ends with a site on which a robot may stand.
 
     Args:
         design: the design.
         pose: its pose.
         bodies: indices of the bodies whose feet are meant.
     """
-    ends = ((i, design.bodies[i].link.end) for i in bodies)
-    feet = [i for i, end in ends if end is not None and end.is_foot]
+    chosen = set(bodies)
+    feet = [i for i in design.feet if i in chosen]
     return [depth(foot) for i in feet for foot in pose.solids(i)[-1:]]

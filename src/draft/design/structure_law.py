@@ -16,6 +16,7 @@ from draft.design.design import Design
 from draft.design.legs import count
 from draft.design.plan import plan
 from draft.laws.structure import CALIBRATED, LEGS, PAPER, Population
+from draft.spec.primitives.root import TrunkPart
 from draft.values import Value, brief
 
 
@@ -36,22 +37,21 @@ def structure_laws(design: Design) -> Population:
     return named if applies else replace(named, uses=PAPER)
 
 
-def leg_of_trunk(design: Design) -> Value | None:
+def leg_of_trunk(design: Design, trunk: TrunkPart) -> Value | None:
     """Leg length that gives the density of the trunk [m]: stated in root.yaml, or the design's own.
 
     None where no leg gives it: the density is stated, or the published law holds.
     """
-    if design.trunk.density_stated or structure_laws(design).uses != CALIBRATED:
+    if trunk.density_stated or structure_laws(design).uses != CALIBRATED:
         return None
-    stated = design.trunk.leg_length
-    return design.leg_length if stated is None else stated
+    return design.leg_length if trunk.leg_length is None else trunk.leg_length
 
 
-def trunk_words(design: Design) -> str:
+def trunk_words(design: Design, trunk: TrunkPart) -> str:
     """The law of the trunk that holds for a design, with the leg length that it takes."""
-    words, leg = structure_laws(design).trunk_words, leg_of_trunk(design)
+    words, leg = structure_laws(design).trunk_words, leg_of_trunk(design, trunk)
     if leg is None:
         return words
-    if design.trunk.leg_length is None:
+    if trunk.leg_length is None:
         return f"{words} = {brief(leg)} m, of this design: longer legs make the trunk denser"
     return f"{words} = {brief(leg)} m, stated in root.yaml: the legs do not change the trunk"

@@ -115,7 +115,7 @@ def sobol_indices(
         raise DraftError("ranges are around one design", "select one, such as `design[0]`")
     if n < 2 or n & (n - 1):
         raise DraftError(f"`n` {n} is no power of two", "such as 1024")
-    axes, metrics = parse(design.spec, vary), closed_metrics(of)
+    axes, metrics = parse(design.spec, vary), closed_metrics(design.spec, of)
     sample, analyse = need("SALib.sample.sobol"), need("SALib.analyze.sobol")
     names = [axis.name for axis in axes]
     problem = {"num_vars": len(axes), "names": names, "bounds": [[0.0, 1.0]] * len(axes)}

@@ -30,6 +30,7 @@ from draft.laws import actuators, catalogue, structure
 from draft.learn.measuring.evaluation_options import LearnedMetrics
 from draft.learn.measuring.policy_metrics import digest
 from draft.metrics.measure import needs_more
+from draft.metrics.registry import misfit, of_base
 from draft.spec import Spec
 from draft.spec.payload import with_payload
 from draft.spec.relative import merged
@@ -170,7 +171,7 @@ def make(
         count,
         settings.seed,
         (settings.where or "").strip(),
-        _metrics(kind, settings.metrics, axes),
+        _metrics(spec, kind, settings.metrics, axes),
         chunk,
         str(Path(learned.policy).absolute()) if learned.policy else "",
         outside=learned.outside,
@@ -248,10 +249,15 @@ def needs_policy(names: Iterable[str]) -> bool:
     return any(m.find(name).needs == "policy" for name in names)
 
 
-def _metrics(kind: str, names: Sequence[str] | None, axes: Sequence[Axis]) -> tuple[str, ...]:
-    known = [x.name for x in m.METRICS.values() if x.needs == "design" or kind == "sweep"]
+def _metrics(
+    spec: Spec, kind: str, names: Sequence[str] | None, axes: Sequence[Axis]
+) -> tuple[str, ...]:
+    own = of_base(spec.floating).values()
+    known = [x.name for x in own if x.needs == "design" or kind == "sweep"]
     chosen = known if names is None else list(dict.fromkeys(names))
     for name in chosen:
+        if (problem := misfit(name, spec.floating)) is not None:
+            raise DraftError(problem)
         if m.find(name).needs != "design" and kind != "sweep":
             raise DraftError(needs_more(m.find(name)))
     clashes = {axis.name for axis in axes} & {*chosen, "index", where.ACCEPTED, "findings"}

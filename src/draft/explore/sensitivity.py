@@ -20,9 +20,10 @@ from draft.design import Design
 from draft.design.error_samples import sample_errors
 from draft.errors import DraftError, suggest
 from draft.explore.settings import EffectSettings, Progress
-from draft.metrics import LEARNED, METRICS, find, of_design
+from draft.metrics import LEARNED, find, of_design
 from draft.metrics.measure import needs_more, of_batch
-from draft.metrics.registry import reads_verdict
+from draft.metrics.registry import misfit, of_base, reads_verdict
+from draft.spec import Spec
 from draft.spec.check import key_problem
 from draft.spec.payload import with_payload
 from draft.values import Array, Value, scalar
@@ -188,7 +189,7 @@ def sensitivity(
         raise DraftError("sensitivities are of one design", "select one, such as `design[0]`")
     learned = tuple(dict.fromkeys(name for name in of if name in LEARNED))
     closed = tuple(name for name in of if name not in LEARNED)
-    metrics = () if learned and not closed else closed_metrics(closed, models=True)
+    metrics = () if learned and not closed else closed_metrics(design.spec, closed, models=True)
     numbers = _chosen(design, by)
     values = np.array(list(numbers.values()))
     steps = np.array([step_of(design, *one) for one in numbers.items()])
@@ -337,10 +338,11 @@ def _measured(many: Design, metrics: Sequence[str]) -> Array:
     return table.reshape(len(metrics), count)
 
 
-def closed_metrics(of: Sequence[str], models: bool = False) -> tuple[str, ...]:
-    """Metrics that need no model, all or those that are named.
+def closed_metrics(spec: Spec, of: Sequence[str], models: bool = False) -> tuple[str, ...]:
+    """Metrics of a robot that need no model, all or those that are named.
 
     Args:
+        spec: the robot.
         of: names of metrics.
         models: whether those of models that are built by arrays may be named too.
 
@@ -348,10 +350,12 @@ def closed_metrics(of: Sequence[str], models: bool = False) -> tuple[str, ...]:
         DraftError: one is unknown, or needs a model or a policy.
     """
     if not of:
-        closed = (one for one in METRICS.values() if one.needs == "design")
+        closed = (one for one in of_base(spec.floating).values() if one.needs == "design")
         return tuple(one.name for one in closed if one.unit != "bool")
     for name in of:
         metric = find(name)
+        if (problem := misfit(name, spec.floating)) is not None:
+            raise DraftError(problem)
         allowed = metric.needs == "design" or (models and metric.needs == "model" and metric.batch)
         if not allowed:
             raise DraftError(needs_more(metric).cause, "omit it: this takes closed forms")

@@ -21,7 +21,7 @@ from draft.explore.quantiles import Quantile, names, split
 from draft.laws.quantities import QUANTITIES
 from draft.metrics import LEARNED, METRICS, find, of_design
 from draft.metrics.learned import PREFIX
-from draft.metrics.registry import RENAMED, unknown
+from draft.metrics.registry import RENAMED, misfit, of_base, unknown
 from draft.spec import Spec
 from draft.spec.expressions import Expression, parse
 from draft.values import Value
@@ -112,17 +112,18 @@ def _metrics(spec: Spec, expression: Expression) -> set[str]:
 
 def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
     owner, dot, quantity = name.partition(".")
-    if name in LEARNED:
-        return None
+    if name in LEARNED or (name in METRICS and name not in spec.parameters):
+        problem = misfit(name, spec.floating)
+        return None if problem is None else replace(problem, where=where)
     if not dot:
-        if name in spec.parameters or name in METRICS or name == ACCEPTED:
+        if name in spec.parameters or name == ACCEPTED:
             return None
         if name in spec.actuators:
             remedy = suggest("", [f"{name}.{q}" for q in QUANTITIES], "read one of")
             return Problem(f"'{name}' is an actuator class, not a number", where, remedy)
         if name in RENAMED:
             return replace(unknown(name), where=where)
-        known = [*spec.parameters, *METRICS, ACCEPTED]
+        known = [*spec.parameters, *of_base(spec.floating), ACCEPTED]
         remedy = suggest(name, known, "parameters and metrics")
         return Problem(f"unknown name '{name}'", where, remedy)
     if dot and f"{owner}." == PREFIX and owner not in spec.actuators:

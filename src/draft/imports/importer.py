@@ -350,7 +350,7 @@ def _complete(files: Files) -> tuple[Design, GeometryCheck]:
     """
     texts = dict(files.texts)
     design = Spec.parse(texts).resolve()
-    leg = leg_of_trunk(design)
+    leg = None if design.lofted is None else leg_of_trunk(design, design.lofted)
     if leg is not None:
         texts["root.yaml"] = write.with_leg_length(texts["root.yaml"], scalar(leg))
         design = Spec.parse(texts).resolve()

@@ -28,6 +28,7 @@ JOULES_PER_WATT_HOUR = 3600.0
     formula="electronics_power + cost_of_standing M",
     source="power of robots that stand, docs/limits.md; heat of the motors as cost_of_standing",
     better="less",
+    base="floating",
 )
 def standing_power(design: Design) -> Value:
     """Electrical power while the robot stands in the crouch [W].
@@ -59,6 +60,7 @@ def _endurance_limits(design: Design) -> Iterator[Limit]:
     source="energy of surveyed batteries, docs/limits.md; power as standing_power",
     better="more",
     limits=_endurance_limits,
+    base="floating",
 )
 def endurance_standing(design: Design) -> Value:
     """Time that the battery lasts while the robot stands in the crouch [h].

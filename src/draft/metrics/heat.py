@@ -36,6 +36,7 @@ HOUR = 3600.0
     source=_OVERLOAD,
     better="more",
     limits=payload_limits(limits.torque_for(HOUR)),
+    base="floating",
 )
 def payload_hour(design: Design) -> Value:
     """Mass on the trunk that the robot can hold in the crouch for an hour [kg].
@@ -51,6 +52,7 @@ def payload_hour(design: Design) -> Value:
     f"{_STALLED.exponent:.2f} at the worst joint in the home pose",
     source=_OVERLOAD,
     better="more",
+    base="floating",
 )
 def hold_time(design: Design) -> Value:
     """Time that the robot can stand in the home pose with what it carries [s].

@@ -41,6 +41,7 @@ BASE = 6  # degrees of freedom of the floating base, which come first
     better="less",
     needs="model",
     batch=True,
+    base="floating",
 )
 def foot_inertia(model: Model | ModelBatch) -> Value:
     """Apparent mass of a foot along the vertical, rotors included [kg]."""
@@ -54,6 +55,7 @@ def foot_inertia(model: Model | ModelBatch) -> Value:
     better="more",
     needs="model",
     batch=True,
+    base="floating",
 )
 def impact_mitigation(model: Model | ModelBatch) -> Value:
     """Vertical impact mitigation factor, the smallest of all feet [1].
@@ -74,6 +76,7 @@ def impact_mitigation(model: Model | ModelBatch) -> Value:
     better="less",
     needs="model",
     batch=True,
+    base="floating",
 )
 def reflected_share(model: Model | ModelBatch) -> Value:
     """Share of rotor inertia in the joint-space inertia of the legs [1]."""

@@ -80,6 +80,7 @@ def _limits(design: Design) -> Iterator[Limit]:
     source="energy balance over the knees' bend; torque-speed line as in arXiv 2609.38405",
     better="more",
     limits=_limits,
+    base="floating",
 )
 def jump_height(design: Design) -> Value:
     """Rise of the trunk above standing straight, from a squat of L / 2 [m].
@@ -94,6 +95,7 @@ def jump_height(design: Design) -> Value:
     formula="max of n min(tau_peak, tau_stall (1 - w / w_no_load)) w / M",
     source="as jump_height",
     better="more",
+    base="floating",
 )
 def squat_power(design: Design) -> Value:
     """Largest power of the knees during that push-off, per mass [W/kg]."""

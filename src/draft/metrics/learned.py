@@ -34,7 +34,9 @@ def _learned(name: str, unit: str, doc: str, formula: str, better: Better) -> No
 
     function = attrgetter(name) if unit == "bool" else inside_only
     metric = Metric(
-        PREFIX + name, unit, doc, formula, _SOURCE, better, "policy", function, batch=True
+        *(PREFIX + name, unit, doc, formula, _SOURCE, better, "policy", function),
+        batch=True,
+        base="floating",
     )
     LEARNED[metric.name] = metric
 

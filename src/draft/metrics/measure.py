@@ -11,7 +11,7 @@ import numpy as np
 from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.extensions import ExtensionWarning
-from draft.metrics.registry import METRICS, Metric, find
+from draft.metrics.registry import METRICS, Metric, find, misfit, of_base
 from draft.values import Array, Value
 
 if TYPE_CHECKING:
@@ -29,17 +29,19 @@ def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, V
 
     Args:
         design: one design, or N.
-        names: names of metrics; None for all that need no model.
+        names: names of metrics; None for all that need no model and that such robots have.
 
     Returns:
         A float per metric, or an array of shape (N,) for N designs, in the unit that
         `draft.metrics.find(name).unit` states; NaN where the robot has no such quantity.
 
     Raises:
-        DraftError: an unknown metric, one that needs a model, or one of an extension that fails; of
-            all metrics, that one is NaN, with a warning.
+        DraftError: an unknown metric, one of robots with another base, one that needs a model, or
+            one of an extension that fails; of all metrics, that one is NaN, with a warning.
     """
-    chosen = [m.name for m in METRICS.values() if m.needs == "design"] if names is None else names
+    chosen = _chosen(names, design)
+    if names is None:
+        chosen = [name for name in chosen if find(name).needs == "design"]
     found: dict[str, Value] = {}
     with np.errstate(all="ignore"):
         for name in chosen:
@@ -49,6 +51,21 @@ def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, V
             value = _value(metric, design, design.count, names is not None)
             found[name] = _of_all(value, design.count)
     return found
+
+
+def _chosen(names: Iterable[str] | None, design: Design) -> list[str]:
+    """Metrics that are named, or all that robots with such a base have.
+
+    Raises:
+        DraftError: an unknown metric, or one of robots with another base.
+    """
+    if names is None:
+        return [*of_base(design.floating)]
+    chosen = list(names)
+    for name in chosen:
+        if (problem := misfit(name, design.floating)) is not None:
+            raise DraftError(problem)
+    return chosen
 
 
 def needs_more(metric: Metric) -> Problem:
@@ -101,10 +118,10 @@ def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, floa
         A float per metric, in the unit that `draft.metrics.find(name).unit` states.
 
     Raises:
-        DraftError: an unknown metric, one that needs a policy, or one of an extension that fails;
-            of all metrics, that one is NaN, with a warning.
+        DraftError: an unknown metric, one of robots with another base, one that needs a policy, or
+            one of an extension that fails; of all metrics, that one is NaN, with a warning.
     """
-    chosen = list(METRICS) if names is None else names
+    chosen = _chosen(names, model.design)
     found: dict[str, float] = {}
     with np.errstate(all="ignore"):
         for name in chosen:

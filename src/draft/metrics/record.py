@@ -8,24 +8,24 @@ from typing import Any
 
 from draft.design import Design
 from draft.metrics.measure import of_design, of_model
-from draft.metrics.registry import LEARNED, METRICS
+from draft.metrics.registry import LEARNED, METRICS, of_base
 from draft.metrics.statics import joint_margins
 from draft.values import scalar
 
 
 def descriptions() -> list[dict[str, str]]:
-    """Every metric, with unit, formula, source, better direction and what it needs."""
-    keys = ("name", "unit", "doc", "formula", "source", "better", "needs")
+    """Every metric, with unit, formula, source, better direction, what it needs, and the base."""
+    keys = ("name", "unit", "doc", "formula", "source", "better", "needs", "base")
     every = (*METRICS.values(), *LEARNED.values())
     return [{key: getattr(metric, key) for key in keys} for metric in every]
 
 
 def measure(design: Design) -> dict[str, float]:
-    """All metrics of a design; NaN for those that need a model if it is refused."""
+    """All metrics that such a design has; NaN for those that need a model if it is refused."""
     if design.accepted:
         return of_model(design.build())
     closed = of_design(design)
-    return {name: scalar(closed.get(name, math.nan)) for name in METRICS}
+    return {name: scalar(closed.get(name, math.nan)) for name in of_base(design.floating)}
 
 
 def record(design: Design, found: Mapping[str, float]) -> dict[str, Any]:

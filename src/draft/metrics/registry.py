@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 Better = Literal["less", "more", ""]
 Needs = Literal["design", "model", "policy"]
+Base = Literal["any", "floating", "fixed"]
 F = TypeVar("F", bound=Callable[[Any], Any])
 
 
@@ -35,6 +36,7 @@ class Metric:
             a Model to a float.
         batch: whether a function of a Model also takes a ModelBatch and returns an array of shape
             (models,); otherwise models are built one by one.
+        base: base of the robots that have it, such as "floating" of what is about walking.
         limits: function from one Design to what limits the metric; None if nothing is named.
     """
 
@@ -48,6 +50,11 @@ class Metric:
     function: Callable[[Any], Any]
     batch: bool = False
     limits: Callable[[Any], Iterable[Limit]] | None = None
+    base: Base = "any"
+
+    def fits(self, floating: bool) -> bool:
+        """Whether robots have it whose base floats, or is fixed to the world."""
+        return self.base in ("any", "floating" if floating else "fixed")
 
 
 METRICS: Registry[Metric] = Registry("metric")
@@ -71,6 +78,7 @@ def metric(
     needs: Needs = "design",
     batch: bool = False,
     limits: Callable[[Any], Iterable[Limit]] | None = None,
+    base: Base = "any",
 ) -> Callable[[F], F]:
     """Register a function as a metric and return it unchanged.
 
@@ -89,6 +97,7 @@ def metric(
         needs: "design" for a function of a Design, "model" for one of a Model.
         batch: whether a function of a Model also takes a ModelBatch.
         limits: function from one Design to what limits it (`draft.metrics.limits`).
+        base: base of the robots that have it: "floating" for what is about legs or walking.
 
     Raises:
         DraftError: a metric of this name exists already.
@@ -98,11 +107,36 @@ def metric(
         name = function.__name__
         line = (inspect.getdoc(function) or "").partition("\n")[0]
         sentence = line.removesuffix(f" [{unit}].").removesuffix(".") + "."
-        made = Metric(name, unit, sentence, formula, source, better, needs, function, batch, limits)
+        numbers = (name, unit, sentence, formula, source, better, needs, function, batch, limits)
+        made = Metric(*numbers, base)
         METRICS.add(name, made, function.__module__)
         return function
 
     return register
+
+
+def of_base(floating: bool, names: Iterable[str] | None = None) -> dict[str, Metric]:
+    """Metrics of robots whose base floats, or is fixed to the world, by name.
+
+    Args:
+        floating: whether the base floats.
+        names: those to choose from; None for all.
+    """
+    chosen = METRICS if names is None else names
+    return {name: METRICS[name] for name in chosen if METRICS[name].fits(floating)}
+
+
+def misfit(name: str, floating: bool) -> Problem | None:
+    """Problem of a metric that no robot of such a base has; None for others.
+
+    Raises:
+        DraftError: there is no such metric.
+    """
+    if find(name).fits(floating):
+        return None
+    own, other = ("floats", "fixed") if floating else ("is fixed to the world", "floating")
+    known = ", ".join(of_base(floating))
+    return Problem(f"'{name}' is of robots on a {other} base; this one {own}", None, f"use {known}")
 
 
 def reads_verdict(names: Iterable[str]) -> bool:

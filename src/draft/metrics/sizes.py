@@ -93,7 +93,7 @@ def actuator_share(design: Design) -> Value:
     return design.actuator_mass / design.mass
 
 
-@metric(unit="m", formula="L = L_thigh + L_shank", source="arXiv 2609.38405")
+@metric(unit="m", formula="L = L_thigh + L_shank", source="arXiv 2609.38405", base="floating")
 def leg_length(design: Design) -> Value:
     """Thigh plus shank, between the axes of hip, knee and ankle [m].
 
@@ -109,6 +109,7 @@ def leg_length(design: Design) -> Value:
     unit="m",
     formula="distance from hip to ankle at the straightest knee + ankle to floor",
     source="geometry",
+    base="floating",
 )
 def reach(design: Design) -> Value:
     """Largest height of the axis of the hip above the floor [m].

@@ -34,6 +34,7 @@ def _limits(design: Design) -> Iterator[Limit]:
     source="arXiv 2609.38405, released code",
     better="more",
     limits=_limits,
+    base="floating",
 )
 def top_speed(design: Design) -> Value:
     """Estimate of the top speed from the swing of the shank and the Froude number [m/s].

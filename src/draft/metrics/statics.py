@@ -54,6 +54,7 @@ def _margin(load: Load) -> Value:
     source=_STATICS,
     better="more",
     limits=_margin_limits,
+    base="floating",
 )
 def torque_margin(design: Design) -> Value:
     """Smallest ratio of peak torque to standing torque of the joints of the legs [1]."""
@@ -76,6 +77,7 @@ def _rated_share(load: Load) -> Value:
     source=_STATICS,
     better="less",
     limits=_standing_limits,
+    base="floating",
 )
 def standing_torque_rated(design: Design) -> Value:
     """Largest share of its rated torque that a joint of the legs needs in the home pose [1]."""
@@ -101,6 +103,7 @@ def payload_limits(share: float) -> Callable[[Design], Iterator[Limit]]:
     source=_STATICS,
     better="more",
     limits=payload_limits(1.0),
+    base="floating",
 )
 def payload_rated(design: Design) -> Value:
     """Mass on the trunk at which the first joint reaches its rated torque [kg].
@@ -119,6 +122,7 @@ def payload_rated(design: Design) -> Value:
     source=_STATICS,
     better="more",
     limits=payload_limits(math.inf),
+    base="floating",
 )
 def payload_peak(design: Design) -> Value:
     """Mass on the trunk at which the first joint reaches its peak torque [kg].
@@ -181,6 +185,7 @@ def _payload(load: Load, share: Value) -> Value:
     formula="min of tau_peak / |dz_foot/dq| / (M g) in the crouch",
     source=_STATICS,
     better="more",
+    base="floating",
 )
 def foot_force(design: Design) -> Value:
     """Vertical force of one foot at peak torque, per body weight [1].
@@ -197,6 +202,7 @@ def foot_force(design: Design) -> Value:
     formula="sum of |dx_foot/dq| w_no_load in the crouch",
     source=_STATICS,
     better="more",
+    base="floating",
 )
 def foot_speed(design: Design) -> Value:
     """Forward speed of the foot with every joint at its no-load speed [m/s].
@@ -215,6 +221,7 @@ def foot_speed(design: Design) -> Value:
     formula="sum of k tau^2 / M",
     source="heat k tau^2 of a motor, docs/limits.md",
     better="less",
+    base="floating",
 )
 def cost_of_standing(design: Design) -> Value:
     """Copper loss of the motors of the legs in the crouch, per mass [W/kg].

@@ -121,7 +121,8 @@ def build_batch(
     good = chosen[~np.isin(chosen, list(outside))]
     with np.errstate(all="ignore"):
         elements = mjcf.robot_element(design)
-    compiler = Compiler(layout(elements, template), template, design.trunk.loft)
+    loft = None if design.lofted is None else design.lofted.loft
+    compiler = Compiler(layout(elements, template), template, loft)
     fields, sound, mass = compile_fields(compiler, good)
     sound &= _weights_agree(design, good, mass[1:])
     if not sound.all():
@@ -254,12 +255,12 @@ def _other_topology(design: Design, rows: Index) -> list[int]:
 
 def _twisted(design: Design, rows: Index) -> list[int]:
     """Designs whose trunk is lofted to a polygon that is counted from another corner."""
-    vertices = design.trunk.loft.vertices
-    if vertices.ndim == 2:
+    root, trunk = design.spec.root, design.lofted
+    if root is None or trunk is None or (vertices := trunk.loft.vertices).ndim == 2:
         return []
-    sections = vertices.reshape(design.trunk.loft.sections, -1, 3, vertices.shape[2])[..., rows]
+    sections = vertices.reshape(trunk.loft.sections, -1, 3, vertices.shape[2])[..., rows]
     twisted = np.zeros(len(rows), dtype=bool)
-    for number, written in enumerate(design.spec.root.sections[1:], start=1):
+    for number, written in enumerate(root.sections[1:], start=1):
         if written.polygon is not None:
             twisted |= twists(sections[number - 1], sections[number])
     return rows[twisted].tolist()

@@ -72,13 +72,13 @@ class Bodies(NamedTuple):
 class Compiler:
     """Compiles designs of one layout."""
 
-    def __init__(self, layout: Layout, template: mujoco.MjModel, loft: Loft) -> None:
+    def __init__(self, layout: Layout, template: mujoco.MjModel, loft: Loft | None) -> None:
         """Prepare what does not depend on the numbers.
 
         Args:
             layout: from `draft.model.batch_layout.layout`.
             template: the compiled model that the layout was matched with.
-            loft: the trunk's solid, of one design or of N.
+            loft: the trunk's solid, of one design or of N; None for a fixed base.
         """
         self.layout, self.template, self.loft = layout, template, loft
         geoms = layout.geoms
@@ -124,15 +124,16 @@ class Compiler:
         quat = _unit(table[geoms.quat][..., : 1 if self.aligned else None])
         volume, moments = _measures(geoms, size)
         frames = quat
-        for k in self.meshes:
-            if frames is quat:
-                frames = np.repeat(quat, size.shape[-1] // quat.shape[-1], axis=-1)
-            volume[k], pos[k], frames[k], moments[k] = self._mesh(rows)
+        if self.loft is not None:
+            frames = np.repeat(quat, size.shape[-1] // quat.shape[-1], axis=-1)
+            for k in self.meshes:
+                volume[k], pos[k], frames[k], moments[k] = _mesh(self.loft, rows)
         sound = (volume[self.solids] > 0).all(axis=0)
         sound &= (volume[self.meshes] > _LEAST_VOLUME).all(axis=0)
         mass = np.where(geoms.massless[:, None], 0.0, table[geoms.density] * volume)
         moments *= mass[:, None]
         bodies = self._bodies(mass, pos, quat, frames, moments)
+        self._place_massless(bodies, table)
         radius, half = _around(geoms, size)
         # The template's mesh has its own place and box.
         for k in self.meshes:
@@ -158,17 +159,6 @@ class Compiler:
         simple = np.flatnonzero(t.body_simple[1:]) + 1
         sound &= (same[simple] == t.body_sameframe[simple, None]).all(axis=0)
         return patches, bodies.mass, sound & self._accepted(bodies)
-
-    def _mesh(self, rows: Index) -> tuple[Array, Array, Array, Array]:
-        """Volume, centre, principal frame and principal moments per mass of the trunk."""
-        vertices = self.loft.vertices
-        vertices = vertices[:, :, rows] if vertices.ndim == 3 else vertices[:, :, None]
-        # MuJoCo keeps the vertices of a mesh in single precision.
-        stored = rounded(vertices).astype(np.float32).astype(np.float64)
-        solid = replace(self.loft, vertices=stored)
-        volume = np.asarray(solid.volume)
-        moments, quat = principal(solid.inertia)
-        return volume, solid.com, quat, moments / volume
 
     def _bodies(
         self, mass: Array, pos: Array, quat: Array, frames: Array, moments: Array
@@ -202,6 +192,17 @@ class Compiler:
             for to, values in zip(found, combined, strict=True):
                 to[several] = values
         return found
+
+    def _place_massless(self, bodies: Bodies, table: Array) -> None:
+        """Give bodies without mass the inertial frame of MuJoCo, a copy of their place."""
+        massless = [body for body, group in enumerate(self.groups) if body and not len(group)]
+        if not massless:
+            return
+        to, places = self.layout.plain["body_pos"]
+        ids, turns = self.layout.unit["body_quat"]
+        for body in massless:
+            bodies.pos[body] = table[places[to // 3 == body]]
+            bodies.quat[body] = _unit(table[turns[ids == body]])[0]
 
     def _accepted(self, bodies: Bodies) -> NDArray[np.bool_]:
         """Whether MuJoCo is sure to accept the bodies."""
@@ -270,6 +271,18 @@ class _Tree:
             high[nodes] = np.maximum(high[first], high[second])
         yield Patch("bvh_aabb", False, self.nodes, slice(0, 3), (low + high) / 2)
         yield Patch("bvh_aabb", False, self.nodes, slice(3, 6), (high - low) / 2)
+
+
+def _mesh(loft: Loft, rows: Index) -> tuple[Array, Array, Array, Array]:
+    """Volume, centre, principal frame and principal moments per mass of the trunk."""
+    vertices = loft.vertices
+    vertices = vertices[:, :, rows] if vertices.ndim == 3 else vertices[:, :, None]
+    # MuJoCo keeps the vertices of a mesh in single precision.
+    stored = rounded(vertices).astype(np.float32).astype(np.float64)
+    solid = replace(loft, vertices=stored)
+    volume = np.asarray(solid.volume)
+    moments, quat = principal(solid.inertia)
+    return volume, solid.com, quat, moments / volume
 
 
 def _unit(values: Array) -> Array:

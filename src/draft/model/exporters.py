@@ -121,9 +121,10 @@ def urdf(model: Model) -> dict[str, str | bytes]:
     from draft.model import urdf as format_
 
     table: dict[str, Any] = plain(format_.actuators(model.design))
+    trunk = model.design.lofted
     return {
         "robot.urdf": format_.robot_urdf(model),
-        format_.TRUNK: format_.trunk_stl(model.design.trunk.loft),
+        **({} if trunk is None else {format_.TRUNK: format_.trunk_stl(trunk.loft)}),
         "actuators.json": json.dumps(table, indent=2) + "\n",
     }
 

@@ -63,16 +63,15 @@ class _Buffer:
 
 
 def robot_glb(model: Model) -> bytes:
-    """Bytes of a .glb file of the robot in its home pose, standing on y = 0 [m]."""
+    """Bytes of a .glb file of the robot in its home pose, with the floor at y = 0 [m]."""
     buffer = _Buffer()
     nodes, meshes = _nodes(model), []
     kinds = colors(model.design)
-    loft = model.design.trunk.loft
     body_nodes: dict[int, int] = {
         node["extras"]["body"]: k for k, node in enumerate(nodes) if "extras" in node
     }
     for shape in shapes(model.mujoco, model.design):
-        solid = triangles(shape, loft)
+        solid = triangles(shape, model.design)
         primitive = {
             "attributes": {
                 "POSITION": buffer.vectors(solid.points),
@@ -105,7 +104,7 @@ def _nodes(model: Model) -> list[Node]:
     holders: list[int] = []  # node of the shapes and children of each body
     for i, body in enumerate(design.bodies, start=1):
         position = compiled.body_pos[i].tolist()
-        if body.parent is None:
+        if body.parent is None and design.floating:
             position = [0.0, 0.0, scalar(design.lowest(home=True))]
         rotation = _xyzw(compiled.body_quat[i].tolist())
         parent = 0 if body.parent is None else holders[body.parent]

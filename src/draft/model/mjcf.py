@@ -27,6 +27,7 @@ from draft.model.texts import Text, of_template
 from draft.model.xml import Element
 from draft.spec.primitives.base import COLORS, Color, Geom
 from draft.spec.primitives.loft import Loft
+from draft.spec.primitives.root import TrunkPart
 from draft.values import Array, Value, both, either, is_array, scalar, sqrt, where
 
 if TYPE_CHECKING:
@@ -38,6 +39,8 @@ _SMALLEST_VERTEX = 1e-30
 # does not measure [m].
 _TOUCHING, _FAR = 0.002, 100.0
 # Default forms of the geoms of a kind.
+# Joint of a floating base.
+FLOATING = "floating_base"
 FORMS = {"trunk": "mesh", "structure": "cylinder", "actuator": "cylinder", "drawn": "cylinder"}
 
 
@@ -68,9 +71,11 @@ def robot_element(design: Design) -> Element:
     numbers, as are the coordinates of the trunk's vertices.
     """
     reuse = plan(design.spec).reuse(design.count)
-    axis, loft = design.spec.root.axis, design.trunk.loft
+    root, trunk = design.spec.root, design.lofted
+    if root is None or trunk is None:
+        return _robot(design, ())
     held = [
-        reuse.result(("bracket", i), _bracket, design.bodies[i], suffix, loft, axis)
+        reuse.result(("bracket", i), _bracket, design.bodies[i], suffix, trunk.loft, root.axis)
         for i, suffix in _hanging(design.spec).items()
     ]
     return _robot(design, held)
@@ -96,7 +101,7 @@ def _hanging(spec: Spec) -> dict[int, str]:
         return {}
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    trunk = model.geom(design.bodies[0].name + design.trunk.suffix).id
+    trunk = model.geom(design.bodies[0].name + TrunkPart.suffix).id
     found: dict[int, str] = {}
     for i, body in enumerate(design.bodies):
         gaps = {
@@ -115,28 +120,21 @@ def _gap(model: mujoco.MjModel, data: mujoco.MjData, first: int, second: int) ->
 
 def _robot(design: Design, brackets: Sequence[Element]) -> Element:
     """Elements of the robot with brackets on its trunk."""
-    reuse, trunk = plan(design.spec).reuse(design.count), design.trunk
+    reuse, trunk = plan(design.spec).reuse(design.count), design.lofted
     name = design.bodies[0].name
     root = Element("mujoco", model=design.name)
     root.add("compiler", angle="radian", autolimits="true")
     root.children.append(reuse.result("defaults", lambda: _defaults(design)))
-    root.add("asset").children.append(reuse.result("mesh", _trunk_mesh, name, trunk.loft))
+    if trunk is not None:
+        root.add("asset").children.append(reuse.result("mesh", _trunk_mesh, name, trunk.loft))
     world = root.add("worldbody")
     elements: list[Element] = []
     # Names are unique: a geom is named after its body, with a suffix that is unique to its kind.
     for i, body in enumerate(design.bodies):
         if body.parent is None:
-            element = world.add("body", name=name, pos=(0, 0, design.lowest()))
-            element.add("freejoint", name="floating_base")
-            element.add(
-                "geom",
-                name=name + trunk.suffix,
-                class_="trunk",
-                mesh=name,
-                density=trunk.density,
-            )
-            element.add("site", name=trunk.site)
+            element = _base(body, trunk, design.lowest())
             element.children += [*brackets, *_parts(body)]
+            world.children.append(element)
         else:
             driven = None if body.joint is None else body.joint.actuator
             actuator = None if driven is None else design.actuators[driven]
@@ -145,16 +143,34 @@ def _robot(design: Design, brackets: Sequence[Element]) -> Element:
             element.children += made.children
             elements[body.parent].children.append(element)
         elements.append(element)
-    root.children.append(reuse.result("sensors", lambda: _sensors(design)))
+    if trunk is not None:
+        root.children.append(reuse.result("sensors", lambda: _sensors(name, trunk.site)))
     return root
 
 
-def _sensors(design: Design) -> Element:
-    sensor, site = Element("sensor"), design.trunk.site
+def _base(body: Body, trunk: TrunkPart | None, height: Value) -> Element:
+    """Element of the base: a trunk that floats, or a body without a joint, fixed to the world."""
+    if trunk is None:
+        return _placed(body)
+    element = Element("body", name=body.name, pos=(0, 0, height))
+    element.add("freejoint", name=FLOATING)
+    element.add(
+        "geom",
+        name=body.name + trunk.suffix,
+        class_="trunk",
+        mesh=body.name,
+        density=trunk.density,
+    )
+    element.add("site", name=trunk.site)
+    return element
+
+
+def _sensors(trunk: str, site: str) -> Element:
+    sensor = Element("sensor")
     sensor.add("gyro", name="imu_ang_vel", site=site)
     sensor.add("velocimeter", name="imu_lin_vel", site=site)
     sensor.add("accelerometer", name="imu_lin_acc", site=site)
-    sensor.add("subtreeangmom", name="root_angmom", body=design.bodies[0].name)
+    sensor.add("subtreeangmom", name="root_angmom", body=trunk)
     return sensor
 
 
@@ -190,8 +206,7 @@ def _trunk_mesh(name: str, loft: Loft) -> Element:
 
 def _body(body: Body, actuator: Actuator | None) -> Element:
     """Element of a body below the trunk with its joint, that an actuator drives, and its parts."""
-    rotation = None if body.rotation is None else g.quaternion(body.rotation)
-    element = Element("body", name=body.name, pos=body.position, quat=rotation)
+    element = _placed(body)
     joint, a = body.joint, actuator
     if joint is not None:
         element.add(
@@ -208,6 +223,12 @@ def _body(body: Body, actuator: Actuator | None) -> Element:
         )
     element.children += _parts(body)
     return element
+
+
+def _placed(body: Body) -> Element:
+    """Element of a body at its place, without its contents."""
+    rotation = None if body.rotation is None else g.quaternion(body.rotation)
+    return Element("body", name=body.name, pos=body.position, quat=rotation)
 
 
 def _parts(body: Body) -> Iterator[Element]:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.errors import DraftError
+from draft.model.mjcf import FLOATING
 from draft.model.model import Model
 from draft.model.shade import Shade, shade
 from draft.values import Array, scalar
@@ -60,8 +61,8 @@ class Exhibit:
     """A robot in a picture.
 
     Attributes:
-        robot: the robot, on a floating base.
-        base: name of the joint of the floating base.
+        robot: the robot.
+        base: name of the joint of its floating base; "" for a base that is bolted to the world.
         height: height of the base's frame above the floor [m].
         home: joint positions by name [rad or m]; joints without one are at zero.
         place: position on the floor [m].
@@ -82,7 +83,7 @@ def exhibit(model: Model, place: tuple[float, float] = (0.0, 0.0), yaw: float = 
     home = {name: scalar(joint.home) for name, joint in design.joints.items()}
     height = scalar(design.lowest(home=True))
     robot = mujoco.MjSpec.from_string(model.xml)
-    return Exhibit(robot, "floating_base", height, home, place, yaw)
+    return Exhibit(robot, FLOATING if design.floating else "", height, home, place, yaw)
 
 
 def row(models: Sequence[Model], yaw: float) -> list[Exhibit]:
@@ -250,13 +251,19 @@ def stage(exhibits: Sequence[Exhibit]) -> tuple[mujoco.MjModel, mujoco.MjData]:
     spec = mujoco.MjSpec()
     _surroundings(spec)
     for i, shown in enumerate(exhibits):
-        spec.attach(shown.robot.copy(), prefix=f"{i}_", frame=spec.worldbody.add_frame())
+        (x, y), half = shown.place, shown.yaw / 2
+        frame = spec.worldbody.add_frame()
+        if not shown.base:
+            frame.pos[:] = x, y, 0.0
+            frame.quat[:] = np.cos(half), 0, 0, np.sin(half)
+        spec.attach(shown.robot.copy(), prefix=f"{i}_", frame=frame)
     model = spec.compile()
     data = mujoco.MjData(model)
     for i, shown in enumerate(exhibits):
         (x, y), half = shown.place, shown.yaw / 2
-        base = data.joint(f"{i}_{shown.base}")
-        base.qpos[:] = (x, y, shown.height, np.cos(half), 0, 0, np.sin(half))
+        if shown.base:
+            base = data.joint(f"{i}_{shown.base}")
+            base.qpos[:] = (x, y, shown.height, np.cos(half), 0, 0, np.sin(half))
         for name, angle in shown.home.items():
             data.joint(f"{i}_{name}").qpos[0] = angle
     mujoco.mj_forward(model, data)

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from draft.design.design import Design
+from draft.model.pose import UPRIGHT, base_coordinates
 from draft.model.xml import Element
 from draft.values import Array, scalar
 
@@ -29,11 +30,10 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
         robot: its compiled model.
     """
     pose = home_position(design)
-    height = pose[2]
     root = Element("mujoco", model=f"{design.name} scene")
     root.add("include", file="robot.xml")
     root.add("option", timestep=TIMESTEP, integrator="implicitfast")
-    _surroundings(root, height)
+    _surroundings(root, *_extent(design, robot, pose))
     custom = root.add("custom")
     servos = root.add("actuator")
     keyframe = root.add("keyframe")
@@ -66,12 +66,23 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
 def home_position(design: Design) -> Array:
     """Position `qpos` of the home pose with the feet on the floor [m, rad], shape (nq,)."""
     joints = [scalar(joint.home) for joint in design.joints.values()]
-    height = scalar(design.lowest(home=True))
-    return np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0, *joints])
+    if not design.floating:
+        return np.array(joints)
+    return np.array([0.0, 0.0, scalar(design.lowest(home=True)), *UPRIGHT[3:], *joints])
 
 
-def _surroundings(root: Element, height: float) -> None:
-    root.add("statistic", center=(0, 0, height / 2), extent=1.5 * abs(height) + 0.3)
+def _extent(
+    design: Design, robot: mujoco.MjModel, pose: Array
+) -> tuple[tuple[float, float, float], float]:
+    """Centre [m] and extent [m] of what a viewer shows first."""
+    if design.floating:
+        return (0, 0, pose[2] / 2), 1.5 * abs(pose[2]) + 0.3
+    x, y, z = robot.stat.center
+    return (x, y, z), robot.stat.extent
+
+
+def _surroundings(root: Element, center: tuple[float, float, float], extent: float) -> None:
+    root.add("statistic", center=center, extent=extent)
     visual = root.add("visual")
     visual.add("global", azimuth=130, elevation=-15)
     visual.add("headlight", ambient=(0.35, 0.35, 0.35), diffuse=(0.5, 0.5, 0.5))
@@ -103,7 +114,7 @@ def _surroundings(root: Element, height: float) -> None:
 
 
 def _gravity_torques(robot: mujoco.MjModel, pose: Array) -> Array:
-    """Joint torques of a robot standing in a pose [N m], shape (joints,).
+    """Joint torques of a robot standing in a pose, or bolted to the world [N m], shape (joints,).
 
     The contact forces are vertical, act at the points of the feet that touch the floor, and have
     the smallest norm of all forces that balance the weight.
@@ -111,9 +122,10 @@ def _gravity_torques(robot: mujoco.MjModel, pose: Array) -> Array:
     data = mujoco.MjData(robot)
     data.qpos[:] = pose
     mujoco.mj_forward(robot, data)
-    torques = data.qfrc_bias[6:].copy()
+    _, dofs = base_coordinates(robot)
+    torques = data.qfrc_bias[dofs:].copy()
     points = foot_points(robot, data)
-    if not points:
+    if not dofs or not points:
         return torques
     x = np.array([point - data.subtree_com[1] for _, point in points])
     balance = np.vstack([np.ones(len(x)), x[:, 0], x[:, 1]])
@@ -122,7 +134,7 @@ def _gravity_torques(robot: mujoco.MjModel, pose: Array) -> Array:
     jacobian = np.zeros((3, robot.nv))
     for (body, point), force in zip(points, forces, strict=True):
         mujoco.mj_jac(robot, data, jacobian, None, point, body)
-        torques -= jacobian[2, 6:] * force
+        torques -= jacobian[2, dofs:] * force
     return torques
 
 

@@ -50,14 +50,13 @@ class Shape:
 def shapes(model: mujoco.MjModel, design: Design) -> list[Shape]:
     """Return the shapes of a robot, in the order of the model's geoms."""
     visible = []
-    trunk = design.bodies[0].name + design.trunk.suffix
     # A compiled model has no geom classes, but colours, in single precision, identify them.
     kinds = {tuple(np.array(color, np.float32)): kind for kind, color in colors().items()}
     for i in range(model.ngeom):
         form = _FORMS[int(model.geom_type[i])]
         name = model.geom(i).name
         # MuJoCo moves a mesh into its principal frame; the loft is in the frame of the body.
-        moved = name == trunk
+        moved = form == "mesh"
         visible.append(
             Shape(
                 name,

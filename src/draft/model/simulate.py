@@ -15,6 +15,7 @@ from draft.design.design import Design
 from draft.design.findings import Finding, note
 from draft.design.parts import Joint
 from draft.errors import counted
+from draft.model.pose import base_coordinates
 from draft.model.scene import foot_points
 from draft.values import Array, brief
 
@@ -45,7 +46,7 @@ class Course:
         at_limit: share of the steps at which each servo gives its peak torque, shape (servos,).
         tilt: tilt of the trunk at the end [rad].
         height: height of the trunk at the end as a share of that at the start.
-        fell: whether it fell.
+        fell: whether it fell; a base that is bolted to the world does not.
         diverged: whether a speed or position is not finite or beyond all servos.
         supports: number of points of feet on the floor in the start pose.
     """
@@ -88,7 +89,8 @@ def run(scene: mujoco.MjModel, duration: float = DURATION) -> Course:
         duration: simulated time [s].
     """
     data = _start(scene)
-    height, supports, time = float(data.qpos[2]), len(foot_points(scene, data)), 0.0
+    places, dofs = base_coordinates(scene)
+    height, supports, time = float(data.xpos[1][2]), len(foot_points(scene, data)), 0.0
     joints, speeds = [], []
     at_limit = np.zeros(scene.nu)
     tilt, fell, diverged = 0.0, False, False
@@ -97,19 +99,20 @@ def run(scene: mujoco.MjModel, duration: float = DURATION) -> Course:
         if diverged:
             break
         time = float(data.time)
-        joints.append(data.qpos[7:].copy())
-        speeds.append(data.qvel[6:].copy())
+        joints.append(data.qpos[places:].copy())
+        speeds.append(data.qvel[dofs:].copy())
         at_limit += np.abs(data.actuator_force) > 0.999 * scene.actuator_forcerange[:, 1]
-        tilt = math.acos(min(max(float(data.xmat[1][8]), -1.0), 1.0))
-        fell = tilt > TILT or (supports > 0 and data.qpos[2] < SUNK * height)
+        if places:
+            tilt = math.acos(min(max(float(data.xmat[1][8]), -1.0), 1.0))
+            fell = tilt > TILT or (supports > 0 and data.qpos[2] < SUNK * height)
     steps = max(len(joints), 1)
     return Course(
         time,
-        np.array(joints).reshape(-1, scene.nq - 7),
-        np.array(speeds).reshape(-1, scene.nv - 6),
+        np.array(joints).reshape(-1, scene.nq - places),
+        np.array(speeds).reshape(-1, scene.nv - dofs),
         at_limit / steps,
         tilt,
-        float(data.qpos[2]) / height if height > 0 else 1.0,
+        float(data.qpos[2]) / height if places and height > 0 else 1.0,
         fell,
         diverged,
         supports,
@@ -245,7 +248,8 @@ class _Servo:
 
 
 def _driven(design: Design, scene: mujoco.MjModel, course: Course) -> Iterator[_Servo]:
-    home, index, servo = scene.key("home").qpos[7:], -1, -1
+    home = scene.key("home").qpos[base_coordinates(scene)[0] :]
+    index = servo = -1
     for body in design.bodies:
         if (joint := body.joint) is None:
             continue

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from draft.design import Design
 from draft.model.shapes import Shape
-from draft.spec.primitives.loft import Loft
 from draft.values import Array
 
 # A multiple of four, so that a round shape has its full width along its axes.
@@ -34,15 +34,16 @@ class Triangles(NamedTuple):
     faces: NDArray[np.int64]
 
 
-def triangles(shape: Shape, loft: Loft, segments: int = SEGMENTS) -> Triangles:
+def triangles(shape: Shape, design: Design, segments: int = SEGMENTS) -> Triangles:
     """Triangles of a shape in its own frame [m].
 
     Args:
         shape: the shape.
-        loft: the trunk, for a shape of form "mesh".
+        design: the design that it belongs to, with the trunk of a shape of form "mesh".
         segments: vertices around a round shape.
     """
     if shape.form == "mesh":
+        loft = design.trunk.loft
         return _flat(loft.vertices[loft.faces()])
     size = shape.size
     if shape.form == "box":

@@ -2,8 +2,9 @@
 
 All numbers are those of the compiled MuJoCo model: frames, shapes, and inertials as full tensors
 about the centre of mass in the axes of the link. Bodies without a joint are links on fixed joints.
-The root link is the trunk; the program that reads the file adds its six degrees of freedom. MuJoCo
-reads its settings from the element `mujoco`, which other programs ignore.
+The root link is the trunk; the program that reads the file adds its six degrees of freedom. A fixed
+base is on a fixed joint of the link `world`, which readers of URDF take for the world. MuJoCo reads
+its settings from the element `mujoco`, which other programs ignore.
 """
 
 from __future__ import annotations
@@ -51,10 +52,12 @@ def robot_urdf(model: Model) -> str:
     )
     for name, color in colors(model.design).items():
         root.add("material", name=name).add("color", rgba=color)
+    if not model.design.floating:
+        root.add("link", name="world")
     drawn = shapes(model.mujoco, model.design)
     for i, body in enumerate(model.design.bodies):
         _link(root, model.mujoco, i + 1, [shape for shape in drawn if shape.body == i + 1])
-        if body.parent is not None:
+        if body.parent is not None or not model.design.floating:
             _joint(root, model, body, i + 1)
     return '<?xml version="1.0"?>\n' + root.text()
 
@@ -88,6 +91,7 @@ def actuators(design: Design) -> dict[str, Any]:
         "robot": design.name,
         "design": design.label,
         "base": design.bodies[0].name,
+        "base_fixed": not design.floating,
         "base_height_at_home": design.lowest(home=True),
         "units": "N m, rad/s, W, kg m2, N m s/rad, N m/rad, rad; m for prismatic joints",
         "torque_speed": _LINE if not cornered else _CORNERED,

@@ -147,7 +147,7 @@ def _parts(subject: Subject) -> dict[str, Part]:
         return {}
     found: dict[str, list[Part]] = {}
     for shape in shapes(model.mujoco, model.design):
-        solid = triangles(shape, model.design.trunk.loft, SEGMENTS)
+        solid = triangles(shape, model.design, SEGMENTS)
         points = solid.points @ shape.rotation.T + shape.position
         bodies = np.full(len(points), shape.body - 1)
         part = Part(points, solid.normals @ shape.rotation.T, bodies)

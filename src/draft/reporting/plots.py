@@ -63,7 +63,7 @@ def parts(subject: Subject) -> dict[str, float]:
     for name, actuator in design.actuators.items():
         count = sum(body.actuator is actuator for body in design.bodies)
         found[f"actuators, {name}"] = scalar(actuator.mass * count)
-    found["trunk"] = scalar(design.trunk.mass)
+    found["trunk" if design.floating else "base"] = scalar(design.base_mass)
     for segment in design.segments:
         label = f"structure, {segment.label.replace('_', ' ')}"
         found[label] = found.get(label, 0.0) + scalar(segment.mass * segment.copies)
@@ -73,9 +73,9 @@ def parts(subject: Subject) -> dict[str, float]:
 
 
 def part_names(tables: Sequence[Mapping[str, float]]) -> list[str]:
-    """Names of all parts: actuators, trunk, structure, carried parts."""
+    """Names of all parts: actuators, trunk or base, structure, carried parts."""
     names = dict.fromkeys(name for table in tables for name in table)
-    order = ("actuators", "trunk", "structure", "carried")
+    order = ("actuators", "trunk", "base", "structure", "carried")
     return sorted(names, key=lambda name: order.index(name.split(",")[0]))
 
 

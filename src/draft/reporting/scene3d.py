@@ -83,7 +83,7 @@ def robot_triangles(model: Model) -> dict[str, Triangles]:
     yaw = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     found: dict[str, list[Triangles]] = {}
     for i, shape in enumerate(shapes(model.mujoco, model.design)):
-        solid = triangles(shape, model.design.trunk.loft, SEGMENTS)
+        solid = triangles(shape, model.design, SEGMENTS)
         if shape.form == "mesh":
             frame, position = data.xmat[shape.body], data.xpos[shape.body]
         else:

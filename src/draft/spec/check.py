@@ -10,9 +10,11 @@ from draft.errors import Location, Problem, SpecError, suggest
 from draft.laws.quantities import CORNER, QUANTITIES
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import order
-from draft.spec.payload import asks
+from draft.spec.payload import KEYS, asks
 from draft.spec.primitives.basic import Segment
+from draft.spec.primitives.foot import PlatePart
 from draft.spec.primitives.root import TrunkPart
+from draft.spec.primitives.sphere import SpherePart
 from draft.spec.problems import first_few
 from draft.spec.schema import STATED, TREND
 from draft.spec.tree import Body
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
 
 # Names that every model already has.
 TAKEN = {"links": "world", "joints": "floating_base"}
+# Name of the site of what a robot stands on.
+_FOOT = "foot"
+_ADD_A_BOX = "add a link of 'type: box' at its tip"
 
 
 def check_spec(spec: Spec) -> None:
@@ -34,10 +39,11 @@ def check_spec(spec: Spec) -> None:
         _reserved_problems(spec),
         _parameter_problems(spec),
         _name_problems(spec),
-        _duplicate_problems(spec.bodies),
+        _duplicate_problems(spec),
         _actuator_problems(spec),
         _structure_problems(spec.bodies),
         _supply_problems(spec),
+        _fixed_problems(spec),
         _allow_problems(spec),
         *(design_problems(spec, design) for design in spec.designs.values()),
     )
@@ -90,7 +96,9 @@ def key_problem(spec: Spec, key: str, where: Location | None) -> Problem | None:
     owner, _, quantity = rest.partition(".")
     if key in spec.parameters or asks(spec, key):
         return None
-    if first in spec.actuators:
+    if key in KEYS and not spec.floating:
+        cause, remedy = f"there is no trunk for a '{key}': the base is fixed", _ADD_A_BOX
+    elif first in spec.actuators:
         cause, remedy = f"'{key}' is not a parameter", f"write 'actuators.{key}'"
     elif first != "actuators":
         cause = f"'{key}' is not a parameter"
@@ -136,6 +144,27 @@ def _supply_problems(spec: Spec) -> Iterator[Problem]:
     for expression in stated:
         if expression is not None and (found := expression_problem(spec, expression)) is not None:
             yield found
+
+
+def _fixed_problems(spec: Spec) -> Iterator[Problem]:
+    """What a robot that is bolted to the world cannot have: feet, and a battery in its trunk."""
+    if spec.floating:
+        return
+    base = spec.bodies[0].name
+    for expression in [*spec.battery.values()][:1]:
+        cause = f"a battery, which is in a trunk: the base '{base}' is fixed"
+        yield Problem(cause, expression.where, "remove 'battery'")
+    for link in {id(body.link): body.link for body in spec.bodies}.values():
+        end = link.end_type
+        named = any(name.split("_")[-1] == _FOOT for name, _ in link.sites)
+        if end is not None and (end is PlatePart or (end is SpherePart and named)):
+            cause = f"'{link.name}' ends in a foot, and the base '{base}' is fixed"
+            remedy = (
+                "give the robot a trunk, 'type: root' and root.yaml, or end the link in "
+                "'type: sphere' with another 'site' or none"
+            )
+            where = link.sites[0][1] if link.sites else link.where
+            yield Problem(cause, where, remedy)
 
 
 def _reserved_problems(spec: Spec) -> Iterator[Problem]:
@@ -201,15 +230,16 @@ def expressions(value: object, seen: set[int]) -> Iterator[Expression]:
                 yield from expressions(item, seen)
 
 
-def _duplicate_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
+def _duplicate_problems(spec: Spec) -> Iterator[Problem]:
     """Names that MuJoCo would find twice."""
+    bodies = spec.bodies
     for kind, names in (
         ("links", [(b.name, b.link.where) for b in bodies]),
         (
             "joints",
             [(b.prefix + b.link.joint.name, b.link.joint.where) for b in bodies if b.link.joint],
         ),
-        ("sites", [site for b in bodies for site in _sites(b)]),
+        ("sites", [site for b in bodies for site in _sites(b, spec.floating)]),
     ):
         first: dict[str, Location] = {}
         for name, where in names:
@@ -224,9 +254,9 @@ def _duplicate_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
             first.setdefault(name, where)
 
 
-def _sites(body: Body) -> list[tuple[str, Location]]:
+def _sites(body: Body, floating: bool) -> list[tuple[str, Location]]:
     if body.parent is None:
-        return [(TrunkPart.site, body.link.where)]
+        return [(TrunkPart.site, body.link.where)] if floating else []
     return [(body.prefix + name, where) for name, where in body.link.sites]
 
 

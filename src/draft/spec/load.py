@@ -20,7 +20,7 @@ from draft.spec import schema
 from draft.spec.check import check_spec, design_problems
 from draft.spec.expressions import Expression, parse
 from draft.spec.field_types import NAME_PATTERN, Model
-from draft.spec.primitives.root import RootFile, read_root
+from draft.spec.primitives.root import RootFile, Trunk, read_root
 from draft.spec.problems import NAME_RULE, first_few, translate
 from draft.spec.reader import Source, read_file, read_mapping, read_text
 from draft.spec.schema import STATED, asks_for_trend
@@ -30,7 +30,9 @@ from draft.spec.tree import expand
 MISSING = (
     "a robot is a folder with parameters.yaml, tree.yaml and root.yaml; 'draft new NAME' makes one"
 )
-FILES = ("parameters.yaml", "tree.yaml", "root.yaml")
+FILES = ("parameters.yaml", "tree.yaml")
+# Of the trunk; a robot on a fixed base has none.
+ROOT_FILE = "root.yaml"
 ROBOTS = Path(__file__).resolve().parent.parent / "robots"
 _NAME = re.compile(NAME_PATTERN)
 _DESIGN = re.compile(r"designs/[^/]+\.yaml")
@@ -104,8 +106,8 @@ def load(robot: str | Path) -> Spec:
         Spec('quadruped', 14 parameters, 1 actuator class, 12 joints, 3 named designs)
 
     Args:
-        robot: name of a shipped robot, or path of a folder with `parameters.yaml`, `tree.yaml` and
-            `root.yaml`.
+        robot: name of a shipped robot, or path of a folder with `parameters.yaml`, `tree.yaml` and,
+            unless its base is fixed, `root.yaml`.
 
     Raises:
         SpecError: listing every problem found, each with file, line and column.
@@ -113,7 +115,8 @@ def load(robot: str | Path) -> Spec:
     folder = find(robot)
     designs = sorted(f"designs/{path.name}" for path in (folder / "designs").glob("*.yaml"))
     file = partial(_inside, folder)
-    return _spec(file, lambda name: read_file(file(name), MISSING), designs, folder)
+    has_root = os.path.lexists(folder / ROOT_FILE)
+    return _spec(file, lambda name: read_file(file(name), MISSING), has_root, designs, folder)
 
 
 def from_files(files: Mapping[str, str | bytes | Mapping[str, object]]) -> Spec:
@@ -134,7 +137,7 @@ def from_files(files: Mapping[str, str | bytes | Mapping[str, object]]) -> Spec:
         return how(file(name).data, name)
 
     designs = sorted(filter(_DESIGN.fullmatch, content))
-    spec = _spec(file, read, designs, None)
+    spec = _spec(file, read, ROOT_FILE in content, designs, None)
     if unused := content.keys() - spec.files.keys() - set(designs):
         name = min(unused)
         remedy = suggest(name, [*spec.files, "designs/NAME.yaml"], "files")
@@ -163,6 +166,7 @@ def _plain(value: object) -> object:
 def _spec(
     file: Callable[[str], Readable],
     read: Callable[[str], Source],
+    has_root: bool,
     designs: Iterable[str],
     folder: Path | None,
 ) -> Spec:
@@ -171,17 +175,26 @@ def _spec(
     Args:
         file: gives a file by its name in the folder.
         read: reads a YAML file by that name.
+        has_root: whether there is a root.yaml.
         designs: names of the files of designs, such as "designs/bear.yaml".
         folder: where they are; None for files in memory.
     """
-    parameters_source, tree_source, root_source = map(read, FILES)
+    parameters_source, tree_source = map(read, FILES)
     parameters_file = validate(schema.ParametersFile, parameters_source)
     tree_file = validate(schema.tree_file(), tree_source)
-    root_file = validate(RootFile, root_source)
+    names, root = FILES, None
+    if isinstance(tree_file.tree, Trunk):
+        names = (*FILES, ROOT_FILE)
+        root_source = read(ROOT_FILE)
+        root = read_root(validate(RootFile, root_source), root_source)
+    elif has_root:
+        cause = f"a base that is fixed, beside the {ROOT_FILE} of a trunk, which floats"
+        remedy = f"delete {ROOT_FILE}, or write 'type: root'"
+        raise SpecError(Problem(cause, tree_source.at(("tree", "type")), remedy))
     trends, structure = parameters_file.trends, parameters_file.structure
     further = [name for name in (trends, structure) if name.endswith(".json")]
     further += [parameters_file.catalogue] if parameters_file.catalogue else []
-    files = {name: file(name) for name in (*FILES, *further)}
+    files = {name: file(name) for name in (*names, *further)}
     spec = Spec(
         name=parameters_file.name,
         doc=parameters_file.doc or "",
@@ -194,7 +207,7 @@ def _spec(
         parameters=_parameters(parameters_file, parameters_source),
         actuators=_actuators(parameters_file, parameters_source),
         bodies=expand(tree_file, tree_source),
-        root=read_root(root_file, root_source),
+        root=root,
         designs={Path(name).stem: _design(read(name)) for name in designs},
         allow={
             item: parameters_source.at(("allow", i)) for i, item in enumerate(parameters_file.allow)

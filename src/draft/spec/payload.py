@@ -44,8 +44,8 @@ def with_payload(spec: Spec, keys: Iterable[str]) -> Spec:
 
 
 def asks(spec: Spec, key: str) -> bool:
-    """Return whether a key of a table of values asks for the block."""
-    return key in KEYS and MASS not in spec.parameters
+    """Return whether a key of a table of values asks for the block; a fixed base has none."""
+    return spec.floating and key in KEYS and MASS not in spec.parameters
 
 
 def _with_block(spec: Spec) -> Spec:

@@ -15,6 +15,8 @@ from draft.spec.reader import Path_, Source
 
 MAX_PROBLEMS = 12
 NAME_RULE = "a name has letters, digits and _, no digit first, and at most 64 of them"
+# Types of the root of a tree.
+ROOTS = ("root", "fixed")
 _KEY = "[key]"  # pydantic's last step where a mapping's key is wrong, not its value
 _MAPPING = "expected a mapping of keys and values"
 
@@ -57,7 +59,7 @@ def _problems(item: ErrorDetails, source: Source) -> Iterator[Problem]:
         yield Problem(f"'{name}' is missing in {what}", source.at(path), f"add '{name}: ...'")
         return
     cause, remedy = _cause_and_remedy(item["type"], item["msg"], item["input"], context)
-    if item["type"] == "link_type":
+    if item["type"] in ("link_type", "root_type"):
         path = (*path, "type")
         what = _dotted(path)
     yield Problem(f"{what}: {cause}", source.at(path, key=item["loc"][-1:] == (_KEY,)), remedy)
@@ -91,9 +93,14 @@ def _cause_and_remedy(
             return f"unknown value {_shown(value)}", suggest(str(value), choices, "choose from")
         case "broken_rule":
             return context["cause"], context["remedy"]
-        case "link_type":
+        case "link_type" | "root_type":
             type_ = value["type"] if isinstance(value, dict) else value
-            remedy = suggest(str(type_), LINKS, "choose from")
+            remedy = suggest(str(type_), ROOTS if kind == "root_type" else LINKS, "choose from")
+            if kind == "link_type" and type_ in ROOTS:
+                remedy = (
+                    "only the root of the tree is of it; a link without 'joint' is fixed to its "
+                    f"parent; {remedy}"
+                )
             return f"unknown value {_shown(type_)}", remedy
     return f"{message}, {found}", ""
 

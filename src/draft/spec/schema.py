@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import pydantic
-from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from draft.laws import quantities
@@ -32,6 +32,7 @@ from draft.spec.field_types import (
 )
 from draft.spec.primitives import LINKS
 from draft.spec.primitives.basic import LinkBase
+from draft.spec.primitives.fixed import FixedBase
 from draft.spec.primitives.root import Trunk
 
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
@@ -274,6 +275,14 @@ else:
     Node = Annotated[Any, _AnyNode()]
 
 
+# Bases that a tree grows from, by their `type`.
+ROOTS = {"root": Trunk, "fixed": FixedBase}
+
+
+def _root_kind(value: object) -> str:
+    return f"({value.get('type', 'root') if isinstance(value, dict) else 'root'})"
+
+
 class TreeFile(Model):
     """tree.yaml: the tree of links and joints."""
 
@@ -282,8 +291,15 @@ class TreeFile(Model):
 
     chains: dict[Name, Annotated[list[Node], Field(min_length=1)]] = Field({})
     """Serial chains of links: each link is attached to the previous one."""
-    tree: Trunk
-    """The trunk, with all links attached to it."""
+    tree: Annotated[
+        Annotated[Trunk, Tag("(root)")] | Annotated[FixedBase, Tag("(fixed)")],
+        Discriminator(
+            _root_kind,
+            custom_error_type="root_type",
+            custom_error_message=f"expected {' or '.join(ROOTS)}",
+        ),
+    ]
+    """The trunk, or a base that is bolted to the world, with all links attached to it."""
 
 
 # --- designs/NAME.yaml ---------------------------------------------------------------------
@@ -310,7 +326,7 @@ def tree_file() -> type[TreeFile]:
 @lru_cache(maxsize=1)
 def _complete(links: tuple[type[LinkBase], ...]) -> None:
     """Build the models that have links, again where a script has added a primitive."""
-    models = (*links, Trunk, TreeFile)
+    models = (*links, *ROOTS.values(), TreeFile)
     for model in models:
         # Each would build on what another one was before.
         if "__pydantic_core_schema__" in model.__dict__:

@@ -83,7 +83,7 @@ class Spec:
         parameters: declared numbers by name, in the order of the file.
         actuators: actuator classes by name.
         bodies: the expanded tree, depth first; body 0 is the trunk.
-        root: the loft of the trunk.
+        root: the loft of the trunk; None for a fixed base.
         designs: named designs.
         allow: errors of the design filter to accept as warnings, with their places.
         payload: index of the body that is a payload on the trunk; None without one.
@@ -102,7 +102,7 @@ class Spec:
     parameters: Mapping[str, Parameter]
     actuators: Mapping[str, ActuatorClass]
     bodies: tuple[Body, ...]
-    root: WrittenRoot
+    root: WrittenRoot | None
     designs: Mapping[str, NamedDesign]
     allow: Mapping[str, Location]
     payload: int | None = None
@@ -124,8 +124,8 @@ class Spec:
 
         Args:
             files: texts, or mappings of plain data, by the name that each has in a robot's folder:
-                `parameters.yaml`, `tree.yaml`, `root.yaml`, any `designs/NAME.yaml`, and the laws
-                and the table that `parameters.yaml` names.
+                `parameters.yaml`, `tree.yaml`, `root.yaml` unless the base is fixed, any
+                `designs/NAME.yaml`, and the laws and the table that `parameters.yaml` names.
 
         Raises:
             SpecError: listing every problem found, each with the name of its file and its line and
@@ -134,6 +134,11 @@ class Spec:
         from draft.spec.load import from_files
 
         return from_files(files)
+
+    @property
+    def floating(self) -> bool:
+        """Whether its base floats; else it is bolted to the world."""
+        return self.root is not None
 
     @property
     def origin(self) -> str:

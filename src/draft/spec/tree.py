@@ -13,8 +13,10 @@ from dataclasses import dataclass, replace
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
 from draft.spec.expressions import Triple, parse
+from draft.spec.field_types import Model
 from draft.spec.links import Joint, Link, read_link
-from draft.spec.primitives.base import read_triple
+from draft.spec.primitives.base import Written, compile_part, read_triple
+from draft.spec.primitives.fixed import FixedBase, PedestalPart
 from draft.spec.reader import Path_, Source
 
 Signs = tuple[float, float, float]
@@ -46,7 +48,7 @@ class Body:
     Attributes:
         name: unique name, prefix included.
         prefix: prefix of the names of its joint and sites.
-        parent: index of its parent among the bodies; None for the trunk.
+        parent: index of its parent among the bodies; None for the trunk or a fixed base.
         link: the link it is a copy of.
         placement: its frame in that of the parent, before mirroring.
         signs: product of the signs of the mirrors above it, per axis.
@@ -69,7 +71,7 @@ class _Changes:
 
 
 def expand(file: schema.TreeFile, source: Source) -> tuple[Body, ...]:
-    """Expand a tree into bodies in depth-first order; the trunk is body 0.
+    """Expand a tree into bodies in depth-first order; the trunk or the fixed base is body 0.
 
     Raises:
         SpecError: a chain does not exist or contains itself, or the tree is too large or too deep.
@@ -89,11 +91,19 @@ class _Expander:
         self.placements: dict[Path_, Placement] = {}
 
     def run(self) -> tuple[Body, ...]:
-        trunk = self.file.tree
-        where = self.source.at(("tree", "name"))
-        link = Link(trunk.name, None, None, None, None, None, None, where)
-        self.bodies.append(Body(trunk.name, "", None, link, Placement(None, None), UNMIRRORED))
-        for i, child in enumerate(trunk.children):
+        root, path = self.file.tree, ("tree",)
+        end_type: type[PedestalPart] | None = None
+        end: Written[Model] | None = None
+        placement = Placement(None, None)
+        if isinstance(root, FixedBase):
+            placement = self.placement(root, path)
+            if root.pedestal is not None:
+                end_type = PedestalPart
+                end = compile_part(root.pedestal, (*path, end_type.key), self.source)
+        where = self.source.at((*path, "name"))
+        link = Link(root.name, None, None, None, None, end_type, end, where)
+        self.bodies.append(Body(root.name, "", None, link, placement, UNMIRRORED))
+        for i, child in enumerate(root.children):
             self.node(child, ("tree", "children", i), 0, "", UNMIRRORED, ())
         return tuple(self.bodies)
 
@@ -133,7 +143,7 @@ class _Expander:
             raise SpecError(Problem(f"more than {MAX_BODIES} bodies", where, "use fewer chains"))
         if self.depths[parent] >= MAX_DEPTH:
             cause = f"more than {MAX_DEPTH} links in series"
-            raise SpecError(Problem(cause, where, "attach some of them to the trunk"))
+            raise SpecError(Problem(cause, where, "attach some of them to the root of the tree"))
 
     def change(self, link: Link, path: Path_, changes: _Changes) -> Link:
         """Link with its joint changed for one use of its chain."""
@@ -207,7 +217,7 @@ class _Expander:
                 cause = f"chain '{use.chain}' has no joint '{name}' to change"
                 raise SpecError(Problem(cause, where, suggest(name, known, "joints")))
 
-    def placement(self, node: schema.Node, path: Path_) -> Placement:
+    def placement(self, node: schema.Node | FixedBase, path: Path_) -> Placement:
         known = self.placements.get(path)
         if known is None:
             at, rpy = (

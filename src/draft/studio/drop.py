@@ -1,4 +1,4 @@
-"""Drop test: the robot falls from a small height in MuJoCo, limp or held by its servos."""
+"""Drop test: the robot falls in MuJoCo, limp or held by its servos; a fixed base stays."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from draft.model import Model
+from draft.model.pose import base_coordinates
 from draft.values import Array
 
 HEIGHT = 0.25  # of the feet above the floor at the start [m]
@@ -36,8 +37,10 @@ class Drop:
         self._scene = model.scene()
         self.data = mujoco.MjData(self._scene)
         mujoco.mj_resetDataKeyframe(self._scene, self.data, 0)
-        self.data.qpos[2] = base + HEIGHT
-        self.data.qpos[7:] = angles
+        first, _ = base_coordinates(self._scene)
+        if first:
+            self.data.qpos[2] = base + HEIGHT
+        self.data.qpos[first:] = angles
         if not held:
             self._scene.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION.value
         self.over = False

@@ -28,7 +28,7 @@ class LeversTab:
         """Add the elements."""
         self._session, self._tasks, self._levers = session, tasks, levers
         self._message = ""
-        names = [NOTHING, *closed_metrics(())]
+        names = [NOTHING, *closed_metrics(session.design.spec, ())]
         numbers = [NOTHING, *stated_numbers(session.design)]
         self._metric = gui.add_dropdown(
             "effect on", names, hint="Sliders show what a step of each does to this metric."

@@ -28,7 +28,7 @@ class RobotMesh:
 
     Attributes:
         model: the robot that is shown; None for none.
-        base: height of the frame of its trunk above the floor [m].
+        base: height of the frame of its trunk above the floor [m]; 0 for a fixed base.
         extent: diagonal of its bounding box in the last pose [m].
     """
 
@@ -59,7 +59,7 @@ class RobotMesh:
         data = self._data
         pose.put(model.mujoco, data, angles)
         points = np.concatenate([skin.placed(data) for skin in self._skins.values()])
-        self.base = -float(points[:, 2].min())
+        self.base = -float(points[:, 2].min()) if model.design.floating else 0.0
         self.extent = float(np.linalg.norm(np.ptp(points, axis=0)))
         data.xpos[1:, 2] += self.base
         self.place(data)

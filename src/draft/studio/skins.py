@@ -84,7 +84,7 @@ def skins(model: Model, segments: int = SEGMENTS) -> dict[Color, Skin]:
     """
     parts: dict[Color, list[Skin]] = {}
     for shape in shapes(model.mujoco, model.design):
-        solid = triangles(shape, model.design.trunk.loft, segments)
+        solid = triangles(shape, model.design, segments)
         vertices = solid.points @ shape.rotation.T + shape.position
         bodies = np.full(len(vertices), shape.body)
         red, green, blue = (round(255 * x) for x in colors()[shape.kind][:3])

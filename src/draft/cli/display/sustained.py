@@ -19,6 +19,8 @@ SHORT = 10.0
 
 def print_limits(design: Design) -> None:
     """Print what a design can sustain; nothing for a robot without legs."""
+    if not design.floating:
+        return
     found = of_design(design, ["standing_torque_rated", "hold_time", "payload_peak"])
     share, time, peak = (scalar(value) for value in found.values())
     if math.isnan(share):

@@ -7,6 +7,7 @@ from rich.markup import escape
 
 from draft.design import Design
 from draft.design.findings import grouped
+from draft.design.machine import machine
 from draft.errors import counted
 from draft.values import scalar
 
@@ -23,12 +24,12 @@ def console() -> Console:
 
 
 def verdict(design: Design) -> str:
-    """One line: name, accepted, refused or not judged, mass, joints."""
+    """One line: name, accepted, refused or not judged, kind of machine, mass, joints."""
     word = "refused" if not design.accepted else "accepted" if design.judged else "not judged"
     load = scalar(design.payload_mass)
     mass = f"{design.mass:.1f} kg" + (f" with its payload of {load:.4g} kg" if load > 0 else "")
     joints = counted(len(design.joints), "joint")
-    return f"{design.name} ({design.label}): {word}, {mass}, {joints}"
+    return f"{design.name} ({design.label}): {word}, {machine(design)}, {mass}, {joints}"
 
 
 def print_verdict(design: Design) -> None:

@@ -59,6 +59,9 @@ def topology(design: Design) -> tuple[str, list[Chain]]:
         DraftError: it has fewer than two legs, or a joint without an actuator.
     """
     name = design.name if design.label == "default" else f"{design.name}:{design.label}"
+    if not design.floating:
+        cause = f"{name} cannot be trained: a policy walks, and its base is fixed to the world"
+        raise DraftError(cause, "name a robot on legs")
     for joint, one in design.joints.items():
         if one.actuator is None:
             raise _untrainable(name, f"its joint {joint} has no actuator")

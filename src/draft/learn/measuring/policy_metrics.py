@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from draft.design import Design
 from draft.errors import DraftError
 from draft.learn.measuring.evaluation_options import BodyRollOuts
-from draft.metrics.registry import LEARNED, find
+from draft.metrics.registry import LEARNED, find, misfit
 from draft.settings import by_keyword
 from draft.values import Array, Value
 
@@ -86,6 +86,8 @@ def of_policy(
         if metric.needs != "policy":
             cause = f"'{metric.name}' needs no policy"
             raise DraftError(cause, "use draft.metrics.of_model")
+        if (problem := misfit(metric.name, design.floating)) is not None:
+            raise DraftError(problem)
     source = source_for(policy, design)
     if known and source.digest != known:
         cause = f"the policy of {source.name} has changed since this began"

@@ -1,6 +1,6 @@
 """Primitives: the types of a link. `LINKS` is their only list, to which `@primitive` adds one.
 
-The trunk is `root`; it is not a link, and a tree has one.
+The root of a tree is not a link: a trunk, `root`, or a base that is bolted to the world, `fixed`.
 """
 
 from __future__ import annotations

@@ -1,0 +1,103 @@
+"""Commands on robots whose base is bolted to the world: no word of them is about legs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from draft.metrics import METRICS
+from tests import fixed
+from tests.commands import Command
+
+OWN = ("mass", "mass_low", "mass_high", "structure_mass", "actuator_share", "accepted")
+
+
+@pytest.fixture(autouse=True)
+def robots(robot: Path) -> None:
+    """The folders `arm` and `hand`, each of two files, beside the robot with a leg."""
+    for name, files in (("arm", fixed.ARM), ("hand", fixed.HAND)):
+        Path(name).mkdir()
+        for file, text in files.items():
+            (Path(name) / file).write_text(text, encoding="utf-8")
+
+
+def test_check_and_metrics_agree_on_what_it_is(command: Command) -> None:
+    for name, kind in (
+        ("arm", "fixed arm, 18.1 kg"),
+        ("hand", "hand of 4 fingers on a fixed base"),
+    ):
+        verdict = f"tester_{name} (default): accepted, {kind}"
+        assert verdict in command(f"check {name}").out
+        found = command(f"metrics {name}").out
+        assert verdict in found
+        assert "-" not in [word for line in found.splitlines() for word in line.split()[1:2]]
+        assert command.json(f"check {name}")["machine"] in kind
+
+
+def test_a_robot_without_legs_that_floats_is_not_judged_by_either(command: Command) -> None:
+    tree = Path("robot/tree.yaml")
+    tree.write_text(tree.read_text().replace(", site: foot", ""))
+    verdict = "not judged, floating robot without legs"
+    assert verdict in command("check robot", code=1).out
+    found = command("metrics robot").out
+    assert verdict in found
+    (accepted,) = [line.split() for line in found.splitlines() if line.startswith("accepted")]
+    assert accepted[1:3] == ["not", "judged"]
+
+
+def test_metrics_of_legs_are_absent_and_not_without_a_value(command: Command) -> None:
+    found = command.json("metrics arm")
+    assert tuple(found["metrics"]) == OWN
+    assert None not in found["metrics"].values()
+    bases = {one["name"]: one["base"] for one in command.json("metrics")}
+    assert bases["mass"] == "any"
+    assert bases["learned.top_speed"] == "floating"
+    assert {name for name in METRICS if bases[name] == "any"} >= {*OWN}
+
+
+@pytest.mark.parametrize("name", ["arm", "hand"])
+def test_it_is_shown_built_and_exported(command: Command, name: str) -> None:
+    shown = command(f"show {name}").out
+    assert "stand" not in shown
+    assert "payload" not in shown
+    assert "trunk" not in shown
+    command(f"build {name} --out model")
+    command(f"export {name} --out out")
+    assert {"robot.urdf", "robot.glb", "scene.xml"} <= {path.name for path in Path("out").iterdir()}
+    assert "not simulated" not in command(f"check {name} --simulate").out
+    report = command.json(f"build {name} --out other")
+    assert report["name"] == f"tester_{name}"
+
+
+def test_a_weak_arm_is_refused_by_what_it_must_hold(command: Command) -> None:
+    said = command("check arm --set actuators.large.peak_torque=12", code=1).out
+    assert "cannot_hold holding the home pose takes" in said
+    assert "at 'lift'" in said
+    assert "refused, fixed arm" in said
+
+
+def test_searches_over_its_parameters_take_its_metrics(command: Command) -> None:
+    pytest.importorskip("optuna")
+    pytest.importorskip("pyarrow")
+    vary = "--vary pedestal_mass=0:40 actuators.large.peak_torque=30:200"
+    screen = command.json(f"screen arm {vary} --n 64 --where 'accepted and mass < 18' --out s")
+    assert 0 < screen["rows"] < 64
+    assert command.json(f"sweep arm {vary} --n 4 --out t")["designs"] == 4
+    command(f"optimise arm {vary} --minimise mass --maximise large.peak_torque --trials 8 --out o")
+    assert "'top_speed' is of robots on a floating base" in command.refuses(
+        f"optimise arm {vary} --maximise top_speed --out p"
+    )
+    table = command.json("sensitivity arm")
+    assert {one for one in OWN if one != "accepted"} <= {*table["metrics"]}
+
+
+def test_it_is_compared_with_a_robot_on_legs_by_what_both_have(command: Command) -> None:
+    pytest.importorskip("plotly")
+    found = command("compare arm robot").out
+    assert "mass" in found
+    assert "jump_height" not in found
+    command("report arm robot hand --out page.html")
+    page = Path("page.html").read_text(encoding="utf-8")
+    assert "tester_arm" in page
+    assert "not judged" not in page
