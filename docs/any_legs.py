@@ -151,7 +151,7 @@ def strip(legs: LegsPolicy, file: Path, path: Path) -> None:
     """Draw a film strip of a robot at the command of its bar, unless it falls."""
     from draft.learn.policy.video import Film
 
-    twin = compare_twin(file, poses=2)
+    twin = compare_twin(file, poses=2, key=path.stem)
     member = by_maker(twin)
     speed = zero_shot.AT[zero_shot.group_of({"legs": len(member.feet)})]
     root = math.sqrt(GRAVITY * member.leg_length)
