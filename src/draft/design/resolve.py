@@ -101,10 +101,10 @@ def _kind(actuator: ActuatorClass, part: Part | None) -> str:
     Raises:
         ResolveError: it states another than that of its part.
     """
-    is_servo = part is not None and catalogue.catalogue(SERVO).get(part.name) is part
-    own = SERVO if is_servo else MODULE
-    stated = actuator.kind or own
-    if is_servo and stated != own:
+    if part is None or catalogue.catalogue(SERVO).get(part.name) is not part:
+        return actuator.kind or MODULE
+    stated = actuator.kind or SERVO
+    if stated != SERVO:
         raise ResolveError(
             Problem(
                 f"actuator '{actuator.name}' is of kind {stated}, and '{part.name}' is a servo",

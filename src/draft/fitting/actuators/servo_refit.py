@@ -41,8 +41,9 @@ def servo_trends() -> dict[str, Any]:
         SERVO, RECIPES, rows_of(catalogue(SERVO).values(), every=True), f"{TABLE}; {PAGE}"
     )
     rotor = coefficients.rounded(_rotor().record())
-    record["laws"] = {**record["laws"], "rotor_inertia": rotor, "rotor_inertia_of_size": rotor}
-    return {SERVO: record}
+    laws: Any = record["laws"]
+    more = {"rotor_inertia": rotor, "rotor_inertia_of_size": rotor}
+    return {SERVO: record | {"laws": laws | more}}
 
 
 def _rotor() -> Law:

@@ -205,7 +205,7 @@ def _numbers(
     device: str | torch.device,
 ) -> dict[str, torch.Tensor]:
     """Numbers of designs by name, shape (designs, ...)."""
-    columns: dict[str, Sequence[ArrayLike]] = {
+    columns: dict[str, ArrayLike] = {
         "leg_scale": [m.scale for m in members],
         "height": [m.height for m in members],
         "top_speed": [m.top_speed for m in members],
@@ -215,12 +215,12 @@ def _numbers(
         "copper_loss": [m.copper_loss for m in members],
         "weight": [GRAVITY * m.mass for m in members],
         "design": np.array(features),
-        "sign": signs,
+        "sign": np.array(signs),
         "home": [m.home for m in members],
         "ranges": [m.ranges for m in members],
     }
     return {
-        name: torch.tensor(values, dtype=torch.float32, device=device)
+        name: torch.tensor(np.asarray(values), dtype=torch.float32, device=device)
         for name, values in columns.items()
     }
 

@@ -22,9 +22,9 @@ from draft.learn.policy.policy import Policy
 from draft.learn.policy.reduced import open_legs_policy
 from draft.learn.training.ppo.checkpoint import first_sentence, read_checkpoint
 from draft.learn.training.run import Origin, file_digest
-from draft.values import Array
 
 Change = Callable[[dict[str, Any]], dict[str, Any]]
+Numbers = NDArray[np.floating[Any]]
 # Iterations of the critic alone.
 ALONE = 10
 # Number of samples that statistics of observations count for when inputs are added, and those of
@@ -113,7 +113,11 @@ def load_of_legs(alg: PPO, file: Path, origin: Origin) -> None:
 
 
 def _state(
-    alg: PPO, mean: Array, divisor: Array, layers: Sequence[tuple[Array, Array]], noise: Array
+    alg: PPO,
+    mean: Numbers,
+    divisor: Numbers,
+    layers: Sequence[tuple[Numbers, Numbers]],
+    noise: Numbers,
 ) -> dict[str, torch.Tensor]:
     """State of rsl-rl's model with given layers, statistics and deviation of actions."""
     normaliser: Any = alg.get_policy().obs_normalizer  # rsl-rl declares no type of it.
