@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import draft
 from draft.design.actuators import size
 from draft.design.bands import actuator_bands
 from draft.errors import DraftError
+from draft.laws.actuators import laws
 from draft.laws.catalogue import SERVO, catalogue
 from draft.laws.servos import FILE, servo_laws
 from draft.spec.new import new_robot
@@ -22,15 +24,15 @@ DOCS = Path(__file__).parents[2] / "docs" / "actuator-trends.md"
 
 
 def test_errors_with_the_maker_held_out_keep_their_bars() -> None:
-    laws = servo_laws().trends
-    assert laws["mass"].n == 116
-    assert laws["mass"].held_out["vendor"] == pytest.approx(1.330, abs=5e-4)
-    assert laws["mass"].held_out["vendor"] < 1.35
-    assert laws["rotor_inertia"].held_out["vendor"] == pytest.approx(1.925, abs=5e-4)
-    assert laws["rotor_inertia"].held_out["vendor"] < 2.0
+    trends = servo_laws().trends
+    assert trends["mass"].n == 116
+    assert trends["mass"].held_out["vendor"] == pytest.approx(1.330, abs=5e-4)
+    assert trends["mass"].held_out["vendor"] < 1.35
+    assert trends["rotor_inertia"].held_out["vendor"] == pytest.approx(1.925, abs=5e-4)
+    assert trends["rotor_inertia"].held_out["vendor"] < 2.0
     text = " ".join(DOCS.read_text(encoding="utf-8").split())
     for name in ("mass", "volume", "gear_ratio", "rotor_inertia"):
-        law = laws[name]
+        law = trends[name]
         assert law.formula in text
         assert f"| {law.n} | {law.held_out['vendor']:.2f} | {law.band(0.9):.2f} |" in text
 
@@ -56,6 +58,12 @@ def test_the_band_of_a_servo_holds_nine_in_ten() -> None:
         low, high = actuator_bands(size("a", stated, None, laws=servo_laws()), 0.9)["mass"]
         inside.append(low <= part.mass <= high)
     assert np.mean(inside) >= 0.9
+
+
+def test_a_set_of_laws_of_that_name_is_of_modules() -> None:
+    own = replace(laws(), name="servo")
+    assert size("a", {"peak_torque": 20, "no_load_speed": 6}, None, laws=own).kind == "module"
+    assert servo_laws().kind == "servo"
 
 
 SERVO_CLASS = "hip: {kind: servo, peak_torque: 3, no_load_speed: 6}"

@@ -11,7 +11,7 @@ import numpy as np
 from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
-from draft.laws.catalogue import MODULE, SERVO, Part
+from draft.laws.catalogue import Part
 from draft.laws.limits import copper_loss
 from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantities
 from draft.laws.torque_speed import Line, stall_torque, torque_speed
@@ -91,7 +91,7 @@ class Actuator(Quantities):
     @property
     def kind(self) -> str:
         """Family whose laws size it: "module" or "servo"."""
-        return SERVO if self.laws.name == SERVO else MODULE
+        return self.laws.kind
 
     @property
     def quantities(self) -> tuple[str, ...]:

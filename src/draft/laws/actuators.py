@@ -18,6 +18,7 @@ from typing import Any
 from draft.errors import DraftError, Location, Problem
 from draft.extensions import Registry
 from draft.files import Readable
+from draft.laws.catalogue import MODULE
 from draft.laws.law import Law
 from draft.laws.limits import limits
 from draft.values import Value, power
@@ -47,11 +48,13 @@ class Laws:
             module's own.
         correlation: correlation over the modules of the errors of two laws, by their quantities,
             each at the module's own inputs. Pairs that no module has are missing.
+        kind: family of actuators that they are of, "module" or "servo".
     """
 
     name: str
     trends: Mapping[str, Law]
     correlation: Mapping[tuple[str, str], float]
+    kind: str = MODULE
 
     def law(self, quantity: str) -> Law:
         """Law of a name; that of the corner speed is the same in every set."""

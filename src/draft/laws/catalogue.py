@@ -19,8 +19,7 @@ from draft.files import Readable
 from draft.laws.table import COLUMNS, Row, read_table
 
 FILE = Path(__file__).resolve().parent / "data" / "actuators.csv"
-# Families of actuators, of laws and limits of their own.
-MODULE, SERVO = "module", "servo"
+MODULE, SERVO = "module", "servo"  # Families of actuators, with laws and limits of their own.
 
 
 @dataclass(frozen=True, slots=True)

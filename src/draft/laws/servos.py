@@ -11,6 +11,7 @@ import csv
 import json
 import math
 import re
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -20,13 +21,11 @@ from draft.laws.catalogue import SERVO, Part
 
 FILE = Path(__file__).resolve().parent / "data" / "small_actuators.csv"
 TRENDS = FILE.with_name("servo_trends.json")
-# Note of rows that are no single actuator, or whose mass is doubtful.
-EXCLUDED = "not in fits"
+EXCLUDED = "not in fits"  # Note of rows that are no single actuator, or of a doubtful mass.
 _SERIES = re.compile("[0-9]*[A-Za-z]*")  # First letters of a model: XM of XM430-W350.
 _REQUIRED = ("stall_torque_Nm", "no_load_speed_rad_s", "length_m", "width_m", "height_m")
 
 
-@lru_cache(maxsize=1)
 def servos() -> dict[str, Part]:
     """Servos by name, in the order of the file, without those that are no single actuator."""
     return {part.name: part for part in read_servos() if EXCLUDED not in part.note}
@@ -50,7 +49,8 @@ def read_servos() -> list[Part]:
 @lru_cache(maxsize=1)
 def servo_laws() -> Laws:
     """Laws of servos; `draft.fitting.actuators.servo_refit` fits them."""
-    return laws_of(SERVO, json.loads(TRENDS.read_text(encoding="utf-8"))[SERVO])
+    record = json.loads(TRENDS.read_text(encoding="utf-8"))[SERVO]
+    return replace(laws_of(SERVO, record), kind=SERVO)
 
 
 def _part(row: dict[str, str], line: int) -> Part:

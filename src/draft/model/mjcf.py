@@ -38,9 +38,8 @@ _SMALLEST_VERTEX = 1e-30
 # Largest gap between the trunk and a part on it that needs no bracket, and gap from which on MuJoCo
 # does not measure [m].
 _TOUCHING, _FAR = 0.002, 100.0
+FLOATING = "floating_base"  # Joint of a floating base.
 # Default forms of the geoms of a kind.
-# Joint of a floating base.
-FLOATING = "floating_base"
 FORMS = {"trunk": "mesh", "structure": "cylinder", "actuator": "cylinder", "drawn": "cylinder"}
 
 

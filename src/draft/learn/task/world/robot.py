@@ -146,8 +146,9 @@ class Robot(Entity):
         Raises:
             KeyError, RuntimeError: they are not those of these worlds.
         """
-        # Earlier states knew straight lines only, and no term of theirs needed these numbers.
-        usual = {name: getattr(self, name) for name in ("weight", "copper_loss", "sign")}
+        # Earlier states knew straight lines only, and no term of theirs needed masses or heat.
+        own = ("weight", "copper_loss", *["sign"] * (not self.cfg.by_slots))
+        usual = {name: getattr(self, name) for name in own}
         numbers = {"stall_torque": numbers["peak_torque"], **usual, **numbers}
         self.redrawn = True
         for name in NUMBERS:

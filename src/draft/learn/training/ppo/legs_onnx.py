@@ -102,9 +102,8 @@ def _commands(run: Run, iteration: int) -> str:
     """
     origin = run.plan.origin
     file = origin.policy_file if origin is not None else None
+    known = open_legs_policy(file).commands if file is not None and file.is_file() else {}
     found: dict[int, list[float]] = {}
-    if file is not None and file.is_file():
-        found = {legs: [*most] for legs, most in open_legs_policy(file).commands.items()}
     rows = [row for row in read_progress(run.folder / PROGRESS) if row["iteration"] <= iteration]
     for members in by_topology(run.plan.members):
         speeds = [row.get(f"{kind_of(members)}/{FASTEST}", 0.0) for row in rows]
@@ -113,7 +112,7 @@ def _commands(run: Run, iteration: int) -> str:
         _, sideways, turn = largest_of_any(run.plan.config.velocity, legs)
         reached = max(speeds, default=0.0) / float(np.sqrt(GRAVITY * sizes).mean())
         one = [reached, sideways.value / (rate * REFERENCE_LEG), turn.value / rate]
-        found[legs] = np.maximum(found.get(legs, [0.0] * 3), one).tolist()
+        found[legs] = np.maximum(found.get(legs, known.get(legs, [0.0] * 3)), one).tolist()
     rows = ([str(legs), *(f"{x:.4g}" for x in one)] for legs, one in found.items())
     return ",".join(map(";".join, rows))
 
