@@ -171,6 +171,43 @@ def test_progress_is_the_share_of_the_command_that_is_walked(
     torch.testing.assert_close(found, torch.tensor([0.5 / rewards.ENOUGH, -1.0, 1.0, 0.0]))
 
 
+def test_a_turn_counts_by_the_share_of_its_command_and_slow_commands_do_not(
+    climbing: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, turned = torch.zeros(4, 3), torch.zeros(4, 3)
+    asked[:, 2] = torch.tensor([1.0, -1.0, 1.0, 0.1])
+    turned[:, 2] = torch.tensor([0.4, 0.5, 3.0, 0.1])
+    monkeypatch.setattr(rewards, "command_of", lambda env: asked)
+    monkeypatch.setattr(
+        rewards, "command_term", lambda env: SimpleNamespace(largest=torch.ones(4, 3))
+    )
+    robot = SimpleNamespace(data=SimpleNamespace(root_link_ang_vel_b=turned))
+    monkeypatch.setattr(rewards, "robot_of", lambda env: robot)
+    found = rewards.turning(climbing, 0.2)
+    torch.testing.assert_close(
+        found, torch.tensor([0.4 / rewards.ENOUGH, -0.5 / rewards.ENOUGH, 1.0, 0.0])
+    )
+
+
+def test_a_share_of_the_commands_has_one_component_only(
+    running: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    term = command_term(running)
+    monkeypatch.setattr(term.cfg, "single", 0.6)
+    monkeypatch.setattr(term.cfg, "rel_forward_envs", 0.0)
+    monkeypatch.setattr(term.cfg, "rel_heading_envs", 1.0)
+    count = torch.zeros(4)
+    for _ in range(100):
+        term._resample_command(torch.arange(WORLDS))
+        alone = (term.vel_command_b != 0).sum(1) == 1
+        assert not (alone & term.is_heading_env).any()  # A heading would add a turn.
+        assert (alone | term.is_heading_env).all()
+        count[:3] += ((term.vel_command_b != 0) & alone[:, None]).sum(0)
+        count[3] += (~alone).sum()
+    shares = (count / count.sum()).tolist()
+    assert shares == pytest.approx([0.2, 0.2, 0.2, 0.4], abs=0.05)
+
+
 def test_the_penalty_on_changes_of_the_action_grows_over_the_first_iterations(
     running: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,7 +25,7 @@ from draft.learn.training.options import TrainOptions  # noqa: E402
 from draft.learn.training.ppo.legs_onnx import export_legs  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.warm_start import ALONE  # noqa: E402
-from draft.learn.training.progress import PROGRESS, gained  # noqa: E402
+from draft.learn.training.progress import FASTEST, PROGRESS, gained  # noqa: E402
 from draft.learn.training.run import policy_file  # noqa: E402
 from draft.learn.training.train import prepare  # noqa: E402
 from tests.commands import Command  # noqa: E402
@@ -105,7 +105,7 @@ def test_a_training_prints_what_it_gained(file: Path, tmp_path: Path, command: C
     text = gained(out / PROGRESS)
     assert text is not None
     assert text in said
-    assert re.search(r"missed by \d.\d\d m/s, at first by \d.\d\d m/s.*of 2 iterations", text)
+    assert re.search(r"missed by \d.\d\d m/s, at first .*by \d.\d\d m/s.*of 2 iterations", text)
     assert f"starts from {file}, policy: iteration 0" in said
     run = learn.open_run(out)
     assert review.before(run, "cpu", QUICK, 2)
@@ -120,6 +120,16 @@ def test_a_training_in_which_no_episode_ended_says_nothing_of_falls(tmp_path: Pa
     (tmp_path / PROGRESS).write_text("\n".join(rows) + "\n", encoding="utf-8")
     assert gained(tmp_path / PROGRESS) == (
         "gained in training: commands are missed by 0.16 m/s, at first by 0.27 m/s "
+        "(means of 1 iteration)"
+    )
+
+
+def test_a_gain_names_the_commands_that_grew(tmp_path: Path) -> None:
+    rows = [f"iteration,tracking_error,falls,{FASTEST}", "1,0.30,0.5,0.6", "2,0.34,0.1,1.5"]
+    (tmp_path / PROGRESS).write_text("\n".join(rows) + "\n", encoding="utf-8")
+    assert gained(tmp_path / PROGRESS) == (
+        "gained in training: commands of up to 1.50 m/s are missed by 0.34 m/s, at first those of "
+        "up to 0.60 m/s by 0.30 m/s, and 10% of episodes end in a fall, at first 50% "
         "(means of 1 iteration)"
     )
 

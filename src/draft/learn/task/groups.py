@@ -306,6 +306,23 @@ class Velocity:
     progress: float = choice(
         0.0, "1", "weight of the speed along the command, per its size, in stage any", DRAFT
     )
+    turning: float = choice(
+        0.0, "1", "weight of the rate of turn along the command, per its size, in stage any", DRAFT
+    )
+    turning_gate: float = choice(
+        0.2,
+        "1",
+        "share of the largest |wz*| up to which that counts no command",
+        DRAFT,
+        within=SHARE,
+    )
+    single: float = choice(
+        0.0,
+        "1",
+        "share of commands of only vx, only vy or only wz, in stage any",
+        DRAFT,
+        within=SHARE,
+    )
     speed_weight: float = choice(
         0.6, "1", "weight of the speed in the commanded sense, per v_cap", CODE, within=ANY
     )

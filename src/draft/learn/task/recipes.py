@@ -156,6 +156,8 @@ ANY = Recipe(
         "velocity.growth": Change(0.05, "commands grow as fast as the worst cell learns"),
         "velocity.missed": Change(0.6, "commands grow past what a body can do"),
         "velocity.progress": Change(1.0, "a robot that stands keeps all other rewards"),
+        "velocity.turning": Change(0.7, "a robot that does not turn keeps all other rewards"),
+        "velocity.single": Change(0.3, "a robot that walks ahead keeps most of the tracking"),
         "rewards.linear_weight": Change(2.0, "a robot that stands keeps all other rewards"),
         "velocity.pushed": Change(0.15, "one policy also learns to survive kicks"),
         "push.ramp": Change(

@@ -140,10 +140,15 @@ def any_legs(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
     for name in ("action_rate", "joint_limits"):
         terms[name].weight *= share
     command.set_largest(*largest_of_any(v, len(member.feet)), task)
+    command.single = v.single
     if v.progress:
         gate = scaled(numbers, "clearance_gate")
         terms["progress"] = RewardTermCfg(
             func=rewards.progress, weight=v.progress, params={"gate": gate}
+        )
+    if v.turning:
+        terms["turning"] = RewardTermCfg(
+            func=rewards.turning, weight=v.turning, params={"gate": v.turning_gate}
         )
 
 

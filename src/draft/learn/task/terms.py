@@ -34,7 +34,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 RESERVED: Mapping[str, tuple[str, ...]] = {
     "reward": (
         *("linear_velocity", "angular_velocity", "vertical_velocity", "joint_limits"),
-        *("upper_legs", "speed", "progress"),
+        *("upper_legs", "speed", "progress", "turning"),
     ),
     "termination": ("tilted", "low", "time_out", "left_ground"),
     "event": (

@@ -173,9 +173,11 @@ def gained(path: Path) -> str | None:
     errors, falls = (
         [row.get(name, math.nan) for row in (first, last)] for name in ("tracking_error", "falls")
     )
+    # Commands grow with what a robot can do: an error says little without their size.
+    asked = [f" of up to {row[FASTEST]:.2f} m/s" if FASTEST in row else "" for row in (first, last)]
     text = (
-        f"gained in training: commands are missed by {errors[1]:.2f} m/s, at first by "
-        f"{errors[0]:.2f} m/s"
+        f"gained in training: commands{asked[1]} are missed by {errors[1]:.2f} m/s, at first"
+        f"{asked[0] and f' those{asked[0]}'} by {errors[0]:.2f} m/s"
     )
     if not any(map(math.isnan, falls)):  # NaN where no episode ended.
         text += f", and {share(falls[1])} of episodes end in a fall, at first {share(falls[0])}"

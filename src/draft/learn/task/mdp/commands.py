@@ -82,6 +82,7 @@ class VelocityCommandCfg(UniformVelocityCommandCfg):
         growth: growth of the largest |vx| by measured tracking; None for the ramp only.
         away: commands along a fixed heading; None for none.
         pushed: commands of the robots with strong pushes; None if all are alike.
+        single: share of the drawn commands of which only vx, vy or wz is kept, a third each.
     """
 
     forward: Scaled = Scaled(1.0)
@@ -95,6 +96,7 @@ class VelocityCommandCfg(UniformVelocityCommandCfg):
     growth: Growth | None = None
     away: Away | None = None
     pushed: Pushed | None = None
+    single: float = 0.0
 
     def set_largest(self, forward: Scaled, sideways: Scaled, turn: Scaled, task: Task) -> None:
         """Set the largest |vx|, |vy| [m/s] and |wz| [rad/s], also of mjlab's sliders."""
@@ -212,12 +214,18 @@ class VelocityCommand(UniformVelocityCommand):
         drawn = 2 * torch.rand(n, 4, device=self.device) - 1
         chance = torch.rand(n, 3, device=self.device)
         value = drawn[:, :3] * self.range_now()[env_ids]
+        heads = chance[:, 0] < cfg.rel_heading_envs
+        if cfg.single:
+            lot = torch.rand(n, device=self.device) * 3 / cfg.single  # 3 and above: all are kept.
+            axes = torch.arange(3, device=self.device)
+            value *= (lot[:, None].floor() == axes) | (lot[:, None] >= 3)
+            heads &= lot >= 3
         ahead = chance[:, 2] < cfg.rel_forward_envs
         straight = torch.zeros_like(value)
         straight[:, 0] = value[:, 0].abs().clamp(min=cfg.forward_least)
         self.vel_command_b[env_ids] = torch.where(ahead[:, None], straight, value)
         self.heading_target[env_ids] = torch.pi * drawn[:, 3]
-        self.is_heading_env[env_ids] = (chance[:, 0] < cfg.rel_heading_envs) & ~ahead
+        self.is_heading_env[env_ids] = heads & ~ahead
         self.is_standing_env[env_ids] = chance[:, 1] < cfg.rel_standing_envs
         self.is_forward_env[env_ids] = ahead
         if cfg.away is not None:

@@ -238,6 +238,21 @@ def progress(env: ManagerBasedRlEnv, gate: Scaled) -> torch.Tensor:
     return share * (size > robot_of(env).scaled(gate))
 
 
+def turning(env: ManagerBasedRlEnv, gate: float) -> torch.Tensor:
+    """Rate of turn along its command, per its size, from -1 to 1; zero for slow commands.
+
+    Rates of roll and pitch of a gait hide slow turns from the tracking of all three rates.
+
+    Args:
+        env: the environment.
+        gate: share of the largest |wz*| up to which commands count as none.
+    """
+    commanded, most = command_of(env)[:, 2], command_term(env).largest[:, 2]
+    along = robot_of(env).data.root_link_ang_vel_b[:, 2] * commanded
+    share = (along / (ENOUGH * commanded.square()).clamp(min=1e-6)).clamp(-1.0, 1.0)
+    return share * (commanded.abs() > gate * most)
+
+
 def track_relative(env: ManagerBasedRlEnv, sigma: Scaled, share: float) -> torch.Tensor:
     """Tracking of vx and vy with the width sqrt(sigma^2 + (share |v*|)^2)."""
     size = command_of(env)[:, :2].norm(dim=1)
