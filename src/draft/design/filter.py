@@ -26,7 +26,7 @@ from draft.design.plan import Plan
 from draft.design.solids import Pose
 from draft.design.structure_law import leg_of_trunk, structure_laws
 from draft.errors import Problem, ResolveError, suggest
-from draft.laws.structure import Population
+from draft.laws.structure import Population, link_laws
 from draft.spec.primitives.root import TrunkPart
 from draft.values import (
     Mask,
@@ -125,6 +125,7 @@ def _segment(population: Population, segment: SegmentMass) -> Iterator[Finding]:
     trend = population.segments.get(segment.kind or "")
     if trend is None:
         return
+    source = f"{population.origin(segment.kind or '')}, {trend.formula}, n = {trend.n}"
     if segment.trend is not None:
         low, high = trend.range
         yield from note(
@@ -134,7 +135,7 @@ def _segment(population: Population, segment: SegmentMass) -> Iterator[Finding]:
             f"length {{value}} of '{segment.bodies[0]}' is outside {low:.3g} to {high:.3g} m, "
             f"the surveyed lengths of its class ({trend.name.replace('_', ' ')}); its mass per "
             "metre is that of the edge",
-            f"{population.name} {trend.name}, {trend.formula}, n = {trend.n}",
+            source,
             segment.length,
             None,
             "m",
@@ -146,7 +147,7 @@ def _segment(population: Population, segment: SegmentMass) -> Iterator[Finding]:
         segment.mass > limit * ROUNDING,
         f"the structural mass {{value}} of '{segment.bodies[0]}' is above {{limit}}, twice "
         "that of its class",
-        f"{population.name} {trend.name}, {trend.formula}, n = {trend.n}",
+        source,
         segment.mass,
         limit,
         "kg",
@@ -233,14 +234,19 @@ def _whole(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
 
 def _legged_trends(design: Design, population: Population) -> Iterator[Finding]:
     """Links of a fixed base whose masses follow from robots with legs."""
-    names = [segment.bodies[0] for segment in design.segments if segment.trend is not None]
+    names = [
+        segment.bodies[0]
+        for segment in design.segments
+        if segment.trend is not None and segment.trend not in link_laws()
+    ]
     if names:
         yield from note(
             "outside_data",
             design.name,
             True,
             f"the trends of surveyed {population.name}s, robots with legs, give the masses of the "
-            f"links of this fixed base, such as '{names[0]}'; state 'mass' of each to replace them",
+            f"links of this fixed base, such as '{names[0]}'; give its member a "
+            f"'segment' of arms or hands, {' or '.join(link_laws())}, or state its 'mass'",
             f"survey of {population.name}s",
         )
 

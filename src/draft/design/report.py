@@ -19,7 +19,7 @@ from draft.laws import catalogue
 from draft.laws.catalogue import Part
 from draft.laws.law import Law
 from draft.laws.quantities import CORNER, QUANTITIES, Quantity
-from draft.laws.structure import Centre, Population
+from draft.laws.structure import Centre, Population, link_laws
 from draft.spec.load import load
 from draft.spec.schema import STATED, TREND
 from draft.values import Value, plain, scalar
@@ -347,11 +347,15 @@ def _segment(segment: SegmentMass, population: Population) -> dict[str, Any]:
     centre = population.centres.get(segment.trend)
     if segment.member_centre is not None and centre is not None:
         record["centre"] = _centre(centre, segment.member_centre)
-    return record | {
+    record |= {
         "origin": "trend",
         "fit": trend.formula,
         "n": trend.n,
         "in_sample_error": trend.fold,
+    }
+    if segment.trend in link_laws():
+        return record | {"source": trend.source}
+    return record | {
         "whole_robot_held_out_error": population.held_out_total,
         "source": population.source,
     }

@@ -51,7 +51,7 @@ def laws() -> dict[str, Law]:
             heat + ", stalled: continuous = " + f"{share:.3f} rated",
             ("excess_heat", "1"),
             _overload(overload, stalled=True, share=share),
-            _power_law,
+            power_law,
             ("module", "draft/fitting/data/overload_times.csv"),
         ),
         "rotating": fitted_law(
@@ -60,7 +60,7 @@ def laws() -> dict[str, Law]:
             heat + ", turning: continuous = rated",
             ("excess_heat", "1"),
             _overload(overload, stalled=False, share=1.0),
-            _power_law,
+            power_law,
             ("module", "draft/fitting/data/overload_times.csv"),
         ),
         "stall_share": stall_share,
@@ -191,7 +191,8 @@ def _rated(name: str) -> float:
     return math.nan if rated is None else rated
 
 
-def _power_law(x: Array, y: Array) -> Term:
+def power_law(x: Array, y: Array) -> Term:
+    """Power law of least squares of the logarithms."""
     intercept, slope = least_squares(np.log(x)[:, None], np.log(y))
     return Term(float(np.exp(intercept)), (float(slope),))
 

@@ -211,6 +211,11 @@ def sigma_of_fold(fold: float) -> float:
     return _SIGMA_OF_FOLD * math.log(fold)
 
 
+def fold_of_sigma(sigma: float) -> float:
+    """Geometric mean fold error of log-normal errors of a standard deviation."""
+    return math.exp(sigma / _SIGMA_OF_FOLD)
+
+
 @lru_cache(maxsize=32)
 def quantile(share: float) -> float:
     """Half-width, in standard deviations, of the central share of a normal distribution."""

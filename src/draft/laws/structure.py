@@ -5,6 +5,9 @@ quadrupeds; outside the fitted lengths of a class, the mass per metre is that at
 without a class has the class `other`: the median mass per metre of all classes, e = 1.
 Source: arXiv 2609.38405, structure trends; coefficients: `draft.fitting.structure.survey_refit`.
 
+Links of arms and hands were not surveyed with robots on legs; each has a class of its own in every
+population: `cobot_link`, `light_link` and `finger` (`draft.fitting.structure.links`).
+
 The trunk weighs its volume times a density: `calibrated`, Draft's own law, which also depends on
 the leg length (`draft.fitting.structure.calibrated`), or `paper`, the published median.
 `draft.design.structure_law` tells which holds for a design.
@@ -25,6 +28,7 @@ from draft.files import Readable
 from draft.laws.law import Law
 
 FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
+LINKS = FILE.with_name("link_trends.json")
 MIDDLE = 0.5
 
 # Laws of the trunk, by the names that parameters.yaml uses.
@@ -88,7 +92,8 @@ class Population:
 
     Attributes:
         name: "humanoid" or "quadruped".
-        segments: structural mass [kg] by segment class, from length [m]; `other` is the last.
+        segments: structural mass [kg] by segment class, from length [m]: those surveyed, those of
+            arms and hands, and `other`, the last.
         centres: centre of mass by segment class, for the classes with a known centre.
         uses: the law of the trunk that holds, `trunk` ("paper") or `calibrated`.
         trunk: structural mass of the trunk [kg] from its volume [m3], by a median density.
@@ -116,6 +121,11 @@ class Population:
     whole: Law
     held_out: HeldOut
     source: str
+
+    def origin(self, kind: str) -> str:
+        """Name of a class of segments, with the population that it was surveyed in."""
+        words = self.segments[kind].name.replace("_", " ")
+        return words if kind in link_laws() else f"{self.name} {words}"
 
     @property
     def trunk_density(self) -> float:
@@ -220,15 +230,20 @@ def read_population(name: str, path: Readable) -> Population:
 def _population(name: str, table: Mapping[str, Any]) -> Population:
     record = table[name]
     share = record["actuator_share"]
-    segments = {**record["segments"], "other": record["other"]}
+    segments = {key: Law.read(key, row) for key, row in record["segments"].items()}
+    segments |= {**link_laws(), "other": Law.read("other", record["other"])}
     uses = table.get(USES, PAPER)
     if uses not in (PAPER, CALIBRATED):
         raise ValueError(uses)
     return Population(
         name=name,
         uses=uses,
-        segments={key: Law.read(key, row) for key, row in segments.items()},
-        centres={key: Centre(**row["centre"]) for key, row in segments.items() if "centre" in row},
+        segments=segments,
+        centres={
+            key: Centre(**row["centre"])
+            for key, row in record["segments"].items()
+            if "centre" in row
+        },
         trunk=Law.read("trunk", record["trunk"]),
         calibrated=Law.read("trunk", record["calibrated"]),
         end=Law.read("end", table["quadruped"]["end"]),
@@ -238,3 +253,10 @@ def _population(name: str, table: Mapping[str, Any]) -> Population:
         held_out=HeldOut(**{k: v for k, v in record["held_out"].items() if k in _SCORES}),
         source=table["source"],
     )
+
+
+@lru_cache(maxsize=1)
+def link_laws() -> Mapping[str, Law]:
+    """Structural mass [kg] of links of arms and hands from length [m], by class."""
+    table = json.loads(LINKS.read_text(encoding="utf-8"))
+    return {key: Law.read(key, row) for key, row in table.items()}

@@ -32,6 +32,9 @@ Segment = Literal[
     "wrist_link",
     "waist_link",
     "head",
+    "finger",
+    "cobot_link",
+    "light_link",
     "other",
 ]
 
