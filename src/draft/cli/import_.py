@@ -13,6 +13,7 @@ import tyro
 from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import JsonOutput, KneeDrive, Population, Speeds, Strict, Torques
 from draft.cli.spelling import spelt
+from draft.design.machine import machine
 from draft.errors import DraftError, counted
 from draft.files import write
 from draft.imports import summary
@@ -111,7 +112,8 @@ def _print(found: Imported) -> None:
     if found.ignored:
         print("omitted: " + ", ".join(f"{n} {what}" for what, n in found.ignored.items()))
     kinds = counted(len(found.spec.actuators), "actuator class")
+    what = machine(found.spec.resolve()) if found.files.fixed else found.spec.population
     print(
-        f"made {found.folder}: a {found.spec.population} with "
+        f"made {found.folder}: a {what} with "
         f"{counted(len(found.joints), 'joint')} and {kinds}; run 'draft show {found.folder}'"
     )

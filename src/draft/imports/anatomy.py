@@ -133,7 +133,11 @@ def _humanoid_limb(reduced: Reduced, limb: Body, key: str, limbs: Limbs) -> None
         collapse(reduced, run(limb)[-1], "branching joints")
         for body in run(limb):
             body.role = "waist"  # It carries the torso on the maker's base.
-    elif _sideways(limb) or (_is_arm(limb) and not _between_arms(limb, limbs)):
+    elif (
+        _sideways(limb)
+        or (_is_arm(limb) and not _between_arms(limb, limbs))
+        or (not limbs.legs and _is_longest(limb))
+    ):
         _limb(reduced, limb, ARM, key)
     else:
         way = run(limb)
@@ -164,6 +168,13 @@ def _between_arms(limb: Body, limbs: Limbs) -> bool:
     """Whether a limb begins between two others that are no legs: it is a neck then."""
     beside = limb.parent.children if limb.parent is not None else []
     return sum(_sideways(one) and not is_leg(one, limbs.ends) for one in beside) > 1
+
+
+def _is_longest(limb: Body) -> bool:
+    """Whether no limb beside it has more hinges: of an arm or a hand, it is no neck."""
+    beside = limb.parent.children if limb.parent is not None else []
+    own = len(slides.hinges(limb.all()))
+    return all(len(slides.hinges(one.all())) <= own for one in beside)
 
 
 def _limb(reduced: Reduced, limb: Body, allowed: Sequence[str], key: str) -> None:

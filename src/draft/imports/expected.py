@@ -64,6 +64,8 @@ def overload(design: Design) -> float:
 def _unlike(files: Files) -> str:
     """In what the robot is unlike those that its trends are fitted to; "" for nothing."""
     population, legs = files.population, files.limbs.legs
+    if files.fixed:
+        return "few arms and hands are known by their links"
     if not legs:
         return "the surveyed robots have legs"
     if legs != LEGS[population]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,12 +25,13 @@ from draft.errors import (
 from draft.files import new_folder
 from draft.imports import names, notes, parts, plausibility, sides, summary, trunk, write
 from draft.imports.anatomy import analyse
+from draft.imports.base import families, pedestal
 from draft.imports.drives import Drive, drives, example
 from draft.imports.expected import doubts, expected_mass
 from draft.imports.formatting import Deviation, Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
 from draft.imports.knees import Knees, knee_drives
-from draft.imports.limbs import NO_LEGS, Limbs, find_limbs, upright
+from draft.imports.limbs import Limbs, find_limbs, upright
 from draft.imports.loops import open_loops
 from draft.imports.mesh_masses import weighed
 from draft.imports.meshes import Meshes
@@ -95,7 +97,7 @@ class Files:
         source: the vendor's file.
         drives: torque and speed of every driven hinge, by the vendor's name.
         knees: where the knees' motors sit.
-        trunk: what the trunk's size is from.
+        trunk: what the trunk's size is from; "" for a machine on a fixed base.
         guessed: actuator classes of the spec whose torques are those of surveyed joints.
         deviations: dimensions in which limbs differ from their counterparts.
         mirrored: number of uses of chains beyond their first.
@@ -113,6 +115,11 @@ class Files:
     guessed: frozenset[str]
     deviations: tuple[Deviation, ...]
     mirrored: int
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the spec has a fixed base instead of a trunk."""
+        return not self.trunk
 
     @property
     def population(self) -> str:
@@ -221,7 +228,7 @@ def translate(
         cause = f"its {axis}: it is turned so that z does and x points forward"
         remedy = "poses of its base in its maker's software differ by that turn"
         doubts.append(Problem(cause, Location(description.file), remedy))
-    limbs = find_limbs(description, population)
+    wanted, limbs = population, find_limbs(description, population)
     population = limbs.population
     opened = open_loops(description, limbs.ends)
     description = opened.description
@@ -229,9 +236,6 @@ def translate(
     plausibility.check_depth(reduced.root)
     kept = {body.joint.name for body in reduced.root.all() if body.joint}
     reduced.notes += [*opened.notes(kept), *doubts]
-    if not limbs.legs:
-        remedy = "masses are those of arms of humanoids; `population` names another population"
-        reduced.notes.append(Problem(NO_LEGS, Location(description.file), remedy))
     analyse(reduced, key, limbs)
     require_hinge(description, reduced.root)
     tidy(reduced)
@@ -239,7 +243,9 @@ def translate(
     unique = names.Unique()
     bodies = reduced.root.all()[1:]
     driven = drives(reduced, population, options, shapes)
-    classes = motors(bodies, driven, unique)
+    classes, links = families(
+        motors(bodies, driven, unique), reduced, limbs, stated=wanted is not None
+    )
     _note_speeds(classes, reduced)
     knees = knee_drives(reduced, shapes, driven, population, options, opened.carried)
     parameters = Parameters(unique, digits=reduced.digits)
@@ -247,10 +253,10 @@ def translate(
     carried = parts.carried(reduced, apart, shapes)
     without = [*apart, *(name for part in carried for name in part)]
     volumes = Volumes(reduced, shapes, driven)
-    middle = trunk.trunk(reduced, without, shapes, parameters, population)
+    middle = None if links else trunk.trunk(reduced, without, shapes, parameters, population)
     head = trunk.head(reduced, apart, shapes, parameters) if apart else None
     tree = Writer(
-        reduced, shapes, population, knees, classes, parameters, volumes, opened.cranks
+        reduced, shapes, population, knees, classes, parameters, volumes, opened.cranks, links
     ).write()
     if head is not None:
         tree.children.append(head)
@@ -266,11 +272,13 @@ def translate(
     name = f"{name}_robot" if name in shipped() else name
     texts = {
         "parameters.yaml": write.parameters_text(name, doc[:390], population, parameters, classes),
-        "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
-        "root.yaml": write.root_text(
-            middle, volumes.trunk_density(middle.slices, population, limbs.legs)
+        "tree.yaml": write.tree_text(
+            trunk.trunk_name(reduced), tree, pedestal(reduced, shapes) if links else None
         ),
     }
+    if middle is not None:
+        density = volumes.trunk_density(middle.slices, population, limbs.legs)
+        texts["root.yaml"] = write.root_text(middle, density)
     return Files(
         texts,
         tree.joints,
@@ -280,7 +288,7 @@ def translate(
         source,
         driven,
         knees,
-        middle.source,
+        "" if middle is None else middle.source,
         frozenset(one.name for one in classes if one.guessed),
         tuple(parameters.deviations),
         tree.copies,
@@ -373,7 +381,7 @@ def _complete(files: Files) -> tuple[Design, GeometryCheck]:
     return design, geometry
 
 
-def _note_speeds(classes: list[Motor], reduced: Reduced) -> None:
+def _note_speeds(classes: Sequence[Motor], reduced: Reduced) -> None:
     """Note how many classes have speeds that no file declares."""
     silent = [motor.name for motor in classes if motor.speed_from == "assumed"]
     if silent:

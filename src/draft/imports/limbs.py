@@ -42,7 +42,8 @@ UPWARD: dict[str, Matrix] = {
 }
 ABOUT: Matrix = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
 FACING: Matrix = ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-NO_LEGS = "no limb reaches the ground; the structure trends do not apply"
+NO_REACH = "no limb reaches the ground"
+NO_LEGS = f"{NO_REACH}; the structure trends do not apply"
 MANIPULATOR = "humanoid"
 
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from draft.imports.drives import GUESSED, Drive
 from draft.imports.names import Unique
 from draft.imports.reduce import Body
+from draft.laws.actuators import laws
+from draft.laws.catalogue import MODULE, SERVO, catalogue
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +23,7 @@ class Motor:
         torque, speed: peak torque [N m] and no-load speed [rad/s].
         joints: the vendor's names of the hinges that it drives.
         torque_from, speed_from: see `Drive`.
+        kind: family of actuators, "module" or "servo".
     """
 
     name: str
@@ -27,6 +32,7 @@ class Motor:
     joints: tuple[str, ...]
     torque_from: str
     speed_from: str
+    kind: str = MODULE
 
     @property
     def guessed(self) -> bool:
@@ -50,3 +56,21 @@ def motors(bodies: Sequence[Body], drives: Mapping[str, Drive], taken: Unique) -
         word = "_".join(roles[:2]) if 0 < len(roles) < 3 else "large" if not found else "shared"
         found.append(Motor(taken(f"{word}_drive"), torque, speed, names, *sources))
     return found
+
+
+def with_kinds(motors: Sequence[Motor]) -> list[Motor]:
+    """Motors of a machine on a fixed base with their families, by torque.
+
+    A class below all modules is a servo; where every class has the torque of a servo, all are.
+    """
+    least, _ = laws().trends["mass"].ranges["peak_torque"]
+    servo = all_servos(motors)
+    return [
+        replace(motor, kind=SERVO) if servo or motor.torque < least else motor for motor in motors
+    ]
+
+
+def all_servos(motors: Sequence[Motor]) -> bool:
+    """Whether no motor is stronger than 95 % of the servos of the catalogue."""
+    most = np.quantile([part.peak_torque for part in catalogue(SERVO).values()], 0.95)
+    return all(motor.torque <= most for motor in motors)

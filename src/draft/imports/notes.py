@@ -48,16 +48,16 @@ def _one(group: list[Problem]) -> Problem:
     return replace(first, cause=f"{first.cause}; {len(others)} more like it: {quoted(names)}")
 
 
-def of_shapes(unread: Sequence[Problem], trunk: Trunk, where: Location) -> list[Problem]:
+def of_shapes(unread: Sequence[Problem], trunk: Trunk | None, where: Location) -> list[Problem]:
     """Warnings of meshes that were not read, and of what stands in for those of the trunk.
 
     Args:
         unread: those of single meshes.
-        trunk: the trunk.
+        trunk: the trunk; None for a fixed base.
         where: place of its link.
     """
     found = merged(unread)
-    if not trunk.fault:
+    if trunk is None or not trunk.fault:
         return found
     if found:  # One cause, one warning.
         cause = f"{found[0].cause}; for the trunk, {trunk.instead}"

@@ -63,12 +63,14 @@ class Writer:
         parameters: Parameters,
         volumes: Volumes,
         cranks: Mapping[str, str] | None = None,
+        link_class: str = "",
     ) -> None:
         self.reduced, self.shapes, self.parameters = reduced, shapes, parameters
         self.population, self.knees, self.cranks = population, knees, cranks or {}
         self.volumes = volumes
         self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
         self.known = set(structure.population(population).segments) - {OTHER}
+        self.link_class = link_class  # of all links of a machine without legs; "" by their kinds
         self.links = names.Unique([trunk_name(reduced)])
         self.joint_names = names.Unique()
         self.chain_names = names.Unique()
@@ -79,7 +81,7 @@ class Writer:
     def write(self) -> Tree:
         """Write all limbs."""
         for body in self.reduced.root.all():
-            body.kind = INSTEAD.get(body.kind, body.kind)
+            body.kind = self.link_class or INSTEAD.get(body.kind, body.kind)
         self.tree.children = self.uses(self.reduced.root)
         return self.tree
 
@@ -342,7 +344,9 @@ class Writer:
     def member(self, body: Body, way: Array, name: str, part: str = "") -> Node:
         """Structural member along a way, with a named length; `part`: ending of that name."""
         length = float(np.linalg.norm(way))
-        repeated = body.kind.endswith("_link") or body.kind not in self.known
+        repeated = (
+            bool(self.link_class) or body.kind.endswith("_link") or body.kind not in self.known
+        )
         word = names.valid(name.removesuffix("_link"))
         label = self.parameters.add(
             f"{word if repeated else body.kind}{part}_length",

@@ -25,6 +25,8 @@ def summary(files: Files, mass: ExpectedMass) -> Lines:
     """
     limbs, knees = files.limbs, files.knees
     lines = [("population", f"{limbs.population}: {limbs.reason}; `population` overrules it")]
+    if files.fixed:
+        lines = [("machine", "on a fixed base: no limb reaches the ground")]
     lines.append(("joints", _joints(files)))
     lines.append(("left and right", _sides(files.deviations, files.mirrored)))
     lines.append(("torques", _sources(files, "torque_from", "`torque`", 17)))
@@ -32,7 +34,8 @@ def summary(files: Files, mass: ExpectedMass) -> Lines:
     if limbs.population == "quadruped" and knees.place is not None:
         text = f"driven at the {knees.place}: {knees.why}"
         lines.append(("knees", f"{text}; `knee_drive` overrules it"))
-    lines.append(("trunk", f"from {files.trunk}"))
+    if not files.fixed:
+        lines.append(("trunk", f"from {files.trunk}"))
     if is_slim(files.drives):
         text = "of slim links, at most what their visible volume weighs in robots of other makers"
         lines.append(("structure", text))
@@ -49,7 +52,7 @@ def record(files: Files, mass: ExpectedMass) -> dict[str, object]:
         "torques": dict(Counter(one.torque_from for one in files.drives.values())),
         "speeds": dict(Counter(one.speed_from for one in files.drives.values())),
         "knee_drive": {"place": files.knees.place, "why": files.knees.why},
-        "trunk": files.trunk,
+        "trunk": files.trunk or None,
         "expected_mass_kg": {
             "mass": mass.mass,
             "band_90": [mass.low, mass.high],

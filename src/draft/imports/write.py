@@ -12,6 +12,7 @@ from draft.imports.formatting import Parameters, Value
 from draft.imports.motors import Motor
 from draft.imports.spec_tree import Tree
 from draft.imports.trunk import Trunk
+from draft.laws.catalogue import MODULE
 from draft.spec.new import SCHEMA_FOLDER
 
 _PLAIN = re.compile(r"(-(?=[A-Za-z0-9(]))?[A-Za-z0-9_(][A-Za-z0-9_ .*/+()'-]*")
@@ -99,13 +100,14 @@ def _motor_lines(motor: Motor) -> list[str]:
     return [
         f"  {motor.name}:",
         f"    doc: {flow(f'Drives {joints}.'[:LONGEST_DOC])}",
+        *([f"    kind: {motor.kind}"] if motor.kind != MODULE else []),
         f"    peak_torque: {motor.torque:g}{TORQUE_SOURCES.get(motor.torque_from, '')}",
         f"    no_load_speed: {motor.speed:g}{SPEED_SOURCES.get(motor.speed_from, '')}",
     ]
 
 
-def tree_text(trunk: str, tree: Tree) -> str:
-    """Text of tree.yaml."""
+def tree_text(trunk: str, tree: Tree, base: Node | None = None) -> str:
+    """Text of tree.yaml; `base` has the keys of a fixed base, None for a trunk."""
     lines = [
         f"# yaml-language-server: $schema={SCHEMA_FOLDER}/tree.json",
         "",
@@ -118,7 +120,9 @@ def tree_text(trunk: str, tree: Tree) -> str:
         for node in nodes:
             lines += _node(node, 4)
         lines.append("")
-    lines += ["tree:", f"  name: {trunk}", "  type: root", "  children:"]
+    lines += ["tree:", f"  name: {trunk}", f"  type: {'root' if base is None else 'fixed'}"]
+    lines += [f"  {key}: {flow(item)}" for key, item in (base or {}).items()]
+    lines.append("  children:")
     for node in tree.children:
         lines += _node(node, 4)
     return "\n".join(lines) + "\n"

@@ -25,7 +25,7 @@ SEED = 0
 
 
 class Machine:
-    """A floating-base model of which one body is held still, and some hinges turn."""
+    """A model of which one body is held still, and some hinges turn."""
 
     def __init__(
         self,
@@ -34,7 +34,7 @@ class Machine:
         base: int,
         upright: Array,
     ) -> None:
-        """Prepare a model whose first joint is that of its floating base.
+        """Prepare a model on a floating base, whose joint is the first one, or on a fixed one.
 
         Args:
             model: the model; it is not changed.
@@ -48,6 +48,7 @@ class Machine:
         self.dofs: Any = model.jnt_dofadr[ids]
         self.limits: Array = model.jnt_range[ids].copy()
         self.base, self.upright = base, upright
+        self.floats = model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE
 
     def _take(self, model: mujoco.MjModel) -> None:
         self.model = copy.copy(model)
@@ -68,7 +69,8 @@ class Machine:
         """
         model, data = self.model, self.data
         data.qpos[:] = 0.0
-        data.qpos[3] = 1.0
+        if self.floats:
+            data.qpos[3] = 1.0
         data.qpos[self.places] = q
         mujoco.mj_kinematics(model, data)
         held = data.xmat[self.base].reshape(3, 3) @ self.upright.T
@@ -81,13 +83,13 @@ class Machine:
         mujoco.mj_forward(model, data)
         full = np.empty((model.nv, model.nv))
         mujoco.mj_fullM(model, data, full)
-        linear, angular = np.empty((3, model.nv)), np.empty((3, model.nv))
-        mujoco.mj_jacBody(model, data, linear, angular, self.base)
-        jacobian = np.concatenate([linear, angular])
-        # Hinges turn and the root moves such that the held body does not.
-        root = -np.linalg.solve(jacobian[:, :6], jacobian[:, self.dofs])
         moves = np.zeros((model.nv, len(self.dofs)))
-        moves[:6] = root
+        if self.floats:
+            linear, angular = np.empty((3, model.nv)), np.empty((3, model.nv))
+            mujoco.mj_jacBody(model, data, linear, angular, self.base)
+            jacobian = np.concatenate([linear, angular])
+            # Hinges turn and the root moves such that the held body does not.
+            moves[:6] = -np.linalg.solve(jacobian[:, :6], jacobian[:, self.dofs])
         moves[self.dofs, np.arange(len(self.dofs))] = 1.0
         return moves.T @ full @ moves, moves.T @ data.qfrc_bias
 

@@ -1,0 +1,81 @@
+"""The base of an imported machine that is bolted to the world, as of an arm or a hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from draft.errors import Location, Problem
+from draft.imports.ends import Node
+from draft.imports.formatting import Value, tidy
+from draft.imports.limbs import NO_LEGS, NO_REACH, Limbs
+from draft.imports.motors import Motor, all_servos, with_kinds
+from draft.imports.reduce import Body, Reduced
+from draft.imports.shapes import Shapes
+
+LEAST = 0.01  # Smallest edge of a pedestal [m].
+FINGER = 0.25  # Distance of a finger's joints from its first, at most [m].
+
+
+def families(
+    motors: Sequence[Motor], reduced: Reduced, limbs: Limbs, stated: bool
+) -> tuple[Sequence[Motor], str]:
+    """Actuator classes with their families, and the class of all links of a fixed machine.
+
+    A robot is bolted to the world where no limb reaches the ground, nothing says that it floats,
+    and no population is `stated`. The class is "" for others. What it is taken for is noted.
+    """
+    if limbs.legs:
+        return motors, ""
+    where = Location(reduced.description.file)
+    if stated or reduced.description.floats or reduced.description.root not in reduced.root.links:
+        remedy = "masses are those of arms of humanoids; `population` names another population"
+        reduced.notes.append(Problem(NO_LEGS, where, remedy))
+        return motors, ""
+    kind = _link_class(reduced, motors)
+    cause = f"{NO_REACH}: it is taken for a machine on a fixed base, whose links have the class "
+    remedy = "edit 'segment' in tree.yaml; `population` makes it a robot with a trunk instead"
+    reduced.notes.append(Problem(cause + kind, where, remedy))
+    return with_kinds(motors), kind
+
+
+def _link_class(reduced: Reduced, motors: Sequence[Motor]) -> str:
+    """Links of fingers, of a collaborative arm, or of one whose motors carry it."""
+    limbs = reduced.root.children
+    if len(limbs) > 1 and all(map(_is_finger, limbs)):
+        return "finger"
+    return "light_link" if all_servos(motors) else "cobot_link"
+
+
+def _is_finger(limb: Body) -> bool:
+    """Whether all joints of a limb lie near its first."""
+    return all(float(np.linalg.norm(b.anchor - limb.anchor)) < FINGER for b in limb.all())
+
+
+def pedestal(reduced: Reduced, shapes: Shapes) -> Node:
+    """Keys of the base: its height above the floor, and the box of its shapes with their mass.
+
+    The mass is the maker's: what stands still loads no joint, and no law predicts it.
+    """
+    links = list(reduced.root.links)
+    own = shapes.points(links)
+    every = [shapes.points(body.links) for body in reduced.root.all()]
+    every.append(np.array([body.anchor for body in reduced.root.all()]))
+    lowest = min(float(points[:, 2].min()) for points in every if len(points))
+    found: Node = {}
+    if lowest < 0:
+        found["at"] = [0, 0, tidy(float(np.ceil(-lowest * 1000) / 1000), 3)]
+    inertials = (reduced.description.links[name].inertial for name in links)
+    mass = sum(one.mass for one in inertials if one is not None)
+    if not len(own) and not shapes.box(links).any():
+        return found
+    if len(own):
+        edges = np.array([*2 * np.abs(own[:, :2]).max(axis=0), own[:, 2].max()])
+    else:
+        edges = shapes.box(links)
+    size: list[Value] = [tidy(max(float(edge), LEAST), 4) for edge in edges]
+    solid: Node = {"size": size}
+    if mass > 0:
+        solid["mass"] = tidy(mass, 3)
+    return found | {"pedestal": solid}

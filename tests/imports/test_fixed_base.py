@@ -1,0 +1,113 @@
+"""Arms and hands are imported on a fixed base, with links and actuators of their own families."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import draft
+from draft.imports.importer import import_robot
+from draft.laws.catalogue import MODULE, SERVO
+from tests import fixed
+from tests.commands import Command
+
+ODD = Path(__file__).parents[2].parent / "shared/robots/odd"
+BASE = '<inertial><mass value="{mass}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+BOX = '<visual><geometry><box size="0.1 0.1 0.2"/></geometry></visual>'
+LINK = '<link name="{name}"><inertial><mass value="0.1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
+LINK += 'ixz="0" iyz="0"/></inertial></link>'
+JOINT = """<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>
+<origin xyz="{at}"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="{effort}" velocity="5"/>
+</joint>"""
+
+
+def urdf(folder: Path, limbs: int, effort: float, length: float) -> Path:
+    """A base of 4 kg, 0.2 m high about its origin, with limbs of three joints upwards."""
+    parts = [f'<link name="base">{BASE.format(mass=4)}</inertial>{BOX}</link>']
+    for i in range(limbs):
+        parent, at = "base", f"0 {0.1 * i} 0.1"
+        for k in range(3):
+            name = f"limb{i}_{k}"
+            parts.append(LINK.format(name=name))
+            joint = {
+                "name": f"{name}_joint",
+                "parent": parent,
+                "child": name,
+                "effort": effort / (1 + 2 * k),
+            }
+            parts.append(JOINT.format(**joint, at=at))
+            parent, at = name, f"0 0 {length}"
+    file = folder / "machine.urdf"
+    file.write_text(f'<robot name="machine">{"".join(parts)}</robot>', encoding="utf-8")
+    return file
+
+
+@pytest.mark.parametrize(
+    ("limbs", "effort", "length", "segment", "kind"),
+    [
+        (1, 60, 0.3, "cobot_link", MODULE),
+        (1, 3, 0.1, "light_link", SERVO),
+        (3, 1, 0.04, "finger", SERVO),
+        (2, 60, 0.3, "cobot_link", MODULE),
+    ],
+    ids=["cobot", "servo arm", "hand", "two arms"],
+)
+def test_a_machine_without_legs_is_imported_on_a_fixed_base(
+    limbs: int, effort: float, length: float, segment: str, kind: str, tmp_path: Path
+) -> None:
+    file = urdf(tmp_path, limbs, effort, length)
+    found = import_robot(file, tmp_path / "out")
+    design = found.spec.resolve()
+    assert not design.floating
+    assert "root.yaml" not in found.spec.files
+    assert {one.trend for one in design.segments} <= {segment}
+    assert {one.kind or MODULE for one in found.spec.actuators.values()} == {kind}
+    model = design.build().mujoco
+    assert model.nq == model.nv == 3 * limbs
+    assert found.geometry.joints == 3 * limbs
+    assert float(design.base_mass) == pytest.approx(4.0)  # The maker's: no law predicts it.
+    # The maker's base reaches 0.1 m below its origin, which is raised so far above the floor.
+    assert model.body("base").pos[2] == pytest.approx(0.1)
+    assert not {"neck", "head"} & {
+        word for name in found.spec.actuators for word in name.split("_")
+    }
+    said = [note.cause for note in found.notes if "fixed base" in note.cause]
+    assert said
+    assert segment in said[0]
+
+
+def test_a_population_that_is_named_makes_it_a_robot_with_a_trunk(tmp_path: Path) -> None:
+    found = import_robot(urdf(tmp_path, 1, 60, 0.3), tmp_path / "out", population="humanoid")
+    assert found.spec.resolve().floating
+
+
+def test_the_command_says_what_machine_it_made(tmp_path: Path, command: Command) -> None:
+    said = command(f"import {urdf(tmp_path, 1, 60, 0.3)} --out", tmp_path / "out").out
+    assert "a fixed arm with 3 joints" in said
+    assert "machine: on a fixed base" in said
+    assert "trunk" not in said.split("made ")[1]
+
+
+def test_the_twin_of_an_arm_is_held_by_its_base(tmp_path: Path) -> None:
+    """An exported arm against its own import: M(q) by the same dynamics of another model."""
+    vendor = draft.export(fixed.arm().resolve(), tmp_path / "vendor") / "robot.urdf"
+    found = draft.compare_twin(vendor, poses=10)
+    assert len(found.joints) == 6
+    assert not found.unmatched
+    assert math.isfinite(found.inertia.median)
+    assert found.vendor_mass == pytest.approx(float(fixed.arm().resolve().mass), rel=1e-6)
+    assert found.mass_ratio == pytest.approx(1.0, abs=0.6)
+
+
+@pytest.mark.skipif(not ODD.is_dir(), reason="needs the gathered robots")
+def test_a_collaborative_arm_is_near_its_mass_by_its_maker(tmp_path: Path) -> None:
+    found = import_robot(ODD / "universal_robots_ur5e/ur5e.xml", tmp_path / "ur5e")
+    design = found.spec.resolve()
+    maker = mujoco.MjSpec.from_file(str(ODD / "universal_robots_ur5e/ur5e.xml"))
+    mass = sum(body.mass for body in maker.bodies)
+    assert 1 / 1.35 < float(design.mass) / mass < 1.35
+    assert np.isclose(float(design.base_mass), 4.0)
