@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from draft.cli.completion import script
+from draft.spec.load import shipped
 from tests.commands import Command
 
 bash = shutil.which("bash")
@@ -70,7 +71,7 @@ def offered(completion: Path, *words: str) -> list[str]:
         (("study", "ro"), ["robot"]),
         (("study", "collect", "--"), ["--out", "--help"]),
         (("study", "mine.yaml", "--dr"), ["--dry-run"]),
-        (("new", "mine", "--like", ""), ["biped", "hexapod", "hopper", "humanoid", "quadruped"]),
+        (("new", "mine", "--like", ""), list(shipped())),
         (("nothing", "x"), []),
     ],
 )

@@ -53,7 +53,9 @@ KINDS = ("body", "joint", "geom", "site", "sensor")
 
 def resolved(design: draft.Design) -> dict[str, Any]:
     """Draft's own numbers of a design."""
-    trunk = design.trunk
+    trunk, base = design.lofted, {"base_mass": design.base_mass}
+    if trunk is not None:
+        base = {"trunk": [trunk.density, trunk.loft.volume, trunk.loft.com, trunk.loft.inertia]}
     return plain(
         {
             "mass": design.mass,
@@ -66,7 +68,7 @@ def resolved(design: draft.Design) -> dict[str, Any]:
             },
             "bodies": design.body_masses(),
             "segments": {s.bodies[0]: [s.length, s.mass, s.copies] for s in design.segments},
-            "trunk": [trunk.density, trunk.loft.volume, trunk.loft.com, trunk.loft.inertia],
+            **base,
         }
     )
 

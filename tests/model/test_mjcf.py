@@ -40,8 +40,9 @@ def test_every_joint_has_the_numbers_of_the_design(model: draft.Model) -> None:
 def test_joints_come_in_the_order_of_the_tree_after_the_floating_base(model: draft.Model) -> None:
     compiled = model.mujoco
     names = [compiled.joint(i).name for i in range(compiled.njnt)]
-    assert names == ["floating_base", *model.design.joints]
-    assert compiled.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE
+    floats = model.design.floating
+    assert names == [*(["floating_base"] if floats else []), *model.design.joints]
+    assert (compiled.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE) == floats
     assert [compiled.body(i).name for i in range(1, compiled.nbody)] == [
         body.name for body in model.design.bodies
     ]
@@ -77,6 +78,8 @@ def test_all_that_a_robot_does_not_weigh_touches_nothing(model: draft.Model) -> 
 
 
 def test_a_robot_at_zero_angles_stands_on_the_floor(model: draft.Model) -> None:
+    if not model.design.floating:
+        pytest.skip("its base is fixed")
     data = mujoco.MjData(model.mujoco)
     mujoco.mj_forward(model.mujoco, data)
     feet = [i for i in range(model.mujoco.ngeom) if model.mujoco.geom(i).name.endswith("_end")]

@@ -69,7 +69,7 @@ def shipped() -> tuple[str, ...]:
     """Names of the robots that Draft and its extensions ship.
 
     >>> draft.shipped()
-    ('biped', 'hexapod', 'hopper', 'humanoid', 'quadruped')
+    ('arm', 'biped', 'hand', 'hexapod', 'hopper', 'humanoid', 'quadruped')
     """
     return tuple(sorted(FOLDERS))
 
