@@ -11,6 +11,7 @@ import pytest
 
 import draft
 from draft.imports.importer import import_robot
+from draft.imports.options import Options
 from draft.laws.catalogue import MODULE, SERVO
 from tests import fixed
 from tests.commands import Command
@@ -111,3 +112,57 @@ def test_a_collaborative_arm_is_near_its_mass_by_its_maker(tmp_path: Path) -> No
     mass = sum(body.mass for body in maker.bodies)
     assert 1 / 1.35 < float(design.mass) / mass < 1.35
     assert np.isclose(float(design.base_mass), 4.0)
+
+
+TWO = """<mujoco model="cell"><worldbody>
+<body name="left" pos="0 1 0"><geom type="box" size="0.1 0.1 0.1"/>{left}</body>
+<body name="right" pos="0 -1 0" euler="0 0 90"><geom type="box" size="0.1 0.1 0.1"/>{right}</body>
+</worldbody></mujoco>"""
+ARM = """<body name="{0}_upper" pos="0 0 0.1"><joint name="{0}_lift" axis="0 1 0" range="-90 90"/>
+<geom type="capsule" size="0.03" fromto="0 0 0 0 0 0.3"/>
+<body name="{0}_fore" pos="0 0 0.3"><joint name="{0}_bend" axis="0 1 0" range="-90 90"/>
+<geom type="capsule" size="0.03" fromto="0 0 0 0 0 0.3"/></body></body>"""
+
+
+def cell(folder: Path) -> Path:
+    """Two equal arms on the world."""
+    file = folder / "cell.xml"
+    text = TWO.format(left=ARM.format("left"), right=ARM.format("right"))
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def test_one_of_several_robots_of_a_file_is_imported_by_its_body(
+    tmp_path: Path, command: Command
+) -> None:
+    said = command.refuses("import", cell(tmp_path), "--out", str(tmp_path / "none"))
+    assert "2 bodies on the world: left, right" in said
+    assert "--root" in said
+    command(f"import {cell(tmp_path)} --root right --torque 30 --out", tmp_path / "right")
+    design = draft.load(tmp_path / "right").resolve()
+    assert list(design.joints) == ["right_lift", "right_bend"]
+    assert not design.floating
+
+
+@pytest.mark.parametrize("kind", ["urdf", "mjcf"])
+def test_a_limb_of_a_robot_is_imported_by_the_link_that_carries_it(
+    kind: str, tmp_path: Path
+) -> None:
+    """The upper arm stays where it is, and what is above it is left out."""
+    folder = draft.export(fixed.arm().resolve(), tmp_path / "maker", [kind])
+    file = next(folder.glob("*.urdf" if kind == "urdf" else "*.xml"))
+    found = import_robot(file, tmp_path / "out", options=Options(root="upper_arm"))
+    assert list(found.joints) == ["elbow", "pitch", "roll", "yaw"]
+    assert found.geometry.joints == 4
+    assert found.geometry.distance < 1e-6
+    twin = draft.compare_twin(file, poses=5, options=Options(root="upper_arm"))
+    assert len(twin.joints) == 4
+
+
+def test_a_root_that_the_file_does_not_have_is_named(tmp_path: Path, command: Command) -> None:
+    said = command.refuses("import", cell(tmp_path), "--root", "rihgt_upper")
+    assert "no link 'rihgt_upper'" in said or "2 bodies" in said
+    folder = draft.export(fixed.arm().resolve(), tmp_path / "maker", ["urdf"])
+    said = command.refuses("import", folder / "robot.urdf", "--root", "uper_arm")
+    assert "it has no link 'uper_arm'" in said
+    assert "did you mean 'upper_arm'?" in said

@@ -11,7 +11,7 @@ from typing import Annotated
 import tyro
 
 from draft.cli.interrupted import NOTHING, if_interrupted
-from draft.cli.options import JsonOutput, KneeDrive, Population, Speeds, Strict, Torques
+from draft.cli.options import JsonOutput, KneeDrive, Population, Root, Speeds, Strict, Torques
 from draft.cli.spelling import spelt
 from draft.design.machine import machine
 from draft.errors import DraftError, counted
@@ -49,6 +49,7 @@ def main(
     speed: Speeds = (),
     strict: Strict = False,
     knee_drive: KneeDrive = None,
+    root: Root = "",
     no_preview: Annotated[
         bool,
         tyro.conf.arg(help="Do not draw preview.png, the maker's robot beside the spec."),
@@ -61,6 +62,7 @@ def main(
         speed=parse(speed, "--speed", "rad/s"),
         strict=strict,
         knee_drive=knee_drive,
+        root=root,
     )
     with if_interrupted(NOTHING):
         found = import_robot(file, out, population=population, options=options)

@@ -95,6 +95,14 @@ KneeDrive = Annotated[
         help_behavior_hint="(default: by the shapes around the knee, else as surveyed)",
     ),
 ]
+Root = Annotated[
+    str,
+    tyro.conf.arg(
+        metavar="LINK",
+        help="Link or body from which down the file is read, such as one of several robots.",
+        help_behavior_hint="(default: all of it)",
+    ),
+]
 JsonOutput = Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")]
 OwnPolicies = Annotated[
     tuple[str, ...],

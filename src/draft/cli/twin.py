@@ -21,6 +21,7 @@ from draft.cli.options import (
     JsonOutput,
     KneeDrive,
     Population,
+    Root,
     Speeds,
     Strict,
     Torques,
@@ -76,6 +77,7 @@ def main(
     speed: Speeds = (),
     strict: Strict = False,
     knee_drive: KneeDrive = None,
+    root: Root = "",
     without: Annotated[
         tuple[str, ...],
         tyro.conf.arg(
@@ -133,7 +135,7 @@ def main(
         raise DraftError(f"--workers {workers} is below 1", "such as 2")
     if every is not None:
         given = {"torque": torque, "speed": speed, "strict": strict, "knee-drive": knee_drive}
-        _refuse("--all", spec=spec, population=population, without=without, **given)
+        _refuse("--all", spec=spec, population=population, without=without, root=root, **given)
         return _all(every, out, workers, poses, seed, json)
     _refuse("one FILE", workers=workers)
     assert file is not None
@@ -143,6 +145,7 @@ def main(
         strict=strict,
         knee_drive=knee_drive,
         without=without,
+        root=root,
     )
     if capabilities:
         _refuse("--capabilities", spec=spec, out=out, without=without)

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Literal
 
 from draft.description.xmlfile import DescriptionError
-from draft.errors import Location, Problem
+from draft.errors import Location, Problem, suggest
 from draft.geometry import (
     IDENTITY,
     ZERO,
@@ -214,6 +214,38 @@ class Description:
         )
         return replace(self, upright=upright, turned=turned)
 
+    def below(self, link: str) -> Description:
+        """Return the part of the robot from a link down, which is bolted to the world there.
+
+        Its axes are those of the world with all joints above it at zero.
+
+        Raises:
+            DescriptionError: there is no such link.
+        """
+        if link == self.root:
+            return self
+        if link not in self.links:
+            remedy = suggest(link, self.links, "links")
+            raise DescriptionError(Problem(f"it has no link '{link}'", Location(self.file), remedy))
+        kept, waiting = set[str](), [link]
+        while waiting:
+            kept.add(waiting[-1])
+            waiting += [joint.child for joint in self.children[waiting.pop()]]
+        upright = self.upright
+        for joint in reversed(self._to_root(link)):
+            upright = compose(upright, joint.rotation) or IDENTITY
+        return replace(
+            self,
+            links={name: own for name, own in self.links.items() if name in kept},
+            joints={name: own for name, own in self.joints.items() if own.parent in kept},
+            root=link,
+            upright=upright,
+            loops=tuple(loop for loop in self.loops if kept.issuperset(loop.links)),
+            floats=False,
+            unweighed=self.unweighed & kept,
+            unplaced=self.unplaced & kept,
+        )
+
     @cached_property
     def children(self) -> dict[str, list[Joint]]:
         """Joints below each link, in the order of the file."""
@@ -286,7 +318,7 @@ def root_of(file: str, links: Mapping[str, Link], joints: Mapping[str, Joint]) -
             Problem(
                 f"{len(roots)} links have no parent: {', '.join(roots[:6])}",
                 links[roots[1]].where,
-                "keep one as the root, and connect the others to it with joints",
+                "name one as `root`, or connect the others to it with joints",
             )
         )
     _refuse_cycles(roots[0], links, joints, above)

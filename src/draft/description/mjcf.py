@@ -61,22 +61,26 @@ def read(path: Path, shown: str | None = None) -> Description:
     return from_xml(includes.expand(read_file(path, shown), path))
 
 
-def from_xml(root: Element) -> Description:
+def from_xml(root: Element, link: str = "") -> Description:
     """Read the root element of an MJCF model, its includes already expanded.
+
+    Args:
+        root: the element.
+        link: a body of the robot that is read; "" for the one with most joints.
 
     Raises:
         DescriptionError: not an MJCF model, or not one robot; the message names the line.
     """
     if root.tag != "mujoco":
         raise root.error(f"the root is <{root.tag}>, an MJCF model has <mujoco>")
-    return _Reader(root).description()
+    return _Reader(root, link).description()
 
 
 class _Reader:
     """Walks the bodies with an explicit stack and collects links and joints."""
 
-    def __init__(self, root: Element) -> None:
-        self.root = root
+    def __init__(self, root: Element, link: str) -> None:
+        self.root, self.link = root, link
         self.compiler = Compiler.read(root)
         self.defaults = Defaults(root)
         self.meshes = mesh_files(root, self.defaults, self.compiler)
@@ -129,13 +133,14 @@ class _Reader:
     def _robot(self, worlds: Sequence[Element]) -> tuple[Element, Pose, str]:
         """Body on the world that is the robot: the only one, or the one with most joints."""
         tops = [top for world in worlds for top in self._flattened(world, "main", "body")]
+        tops = [top for top in tops if _holds(top[0], self.link)] or tops
         counts = [_joint_count(top[0]) for top in tops]
         most = max(counts, default=0)
         if not tops or (counts.count(most) > 1 and len(tops) > 1):
             names = ", ".join(top.attributes.get("name", "?") for top, _, _ in tops[:6])
             raise worlds[0].error(
                 f"{len(tops)} bodies on the world{': ' + names if names else ''}",
-                "keep one robot in a copy of the model",
+                "name a body of the one to read as `root`, or keep one in a copy of the model",
             )
         robot = tops[counts.index(most)]
         for (top, _, _), count in zip(tops, counts, strict=True):
@@ -356,3 +361,14 @@ def _fixed(body: Element, name: str, parent: str, pose: Pose) -> Joint:
         velocity=None,
         where=body.where,
     )
+
+
+def _holds(body: Element, name: str) -> bool:
+    """Whether a body has a name, or holds a body that does."""
+    waiting = [body]
+    while waiting:
+        element = waiting.pop()
+        if element.tag == "body" and element.attributes.get("name") == name:
+            return True
+        waiting.extend(element.children)
+    return False

@@ -8,7 +8,7 @@ from pathlib import Path
 from draft.description import includes, mjcf, urdf, xmlfile
 from draft.description.description import Description
 
-READERS: dict[str, Callable[[xmlfile.Element], Description]] = {
+READERS: dict[str, Callable[[xmlfile.Element, str], Description]] = {
     "robot": urdf.from_xml,
     "mujoco": mjcf.from_xml,
 }
@@ -31,8 +31,17 @@ def read_root(path: Path, shown: str | None = None, text: str | None = None) -> 
     return includes.expand(root, path) if root.tag == "mujoco" else root
 
 
-def describe(path: Path, shown: str | None = None, text: str | None = None) -> Description:
-    """Read a URDF or MJCF file; arguments as `read_root`.
+def describe(
+    path: Path, shown: str | None = None, text: str | None = None, link: str = ""
+) -> Description:
+    """Read a URDF or MJCF file.
+
+    Args:
+        path: the file.
+        shown: name of the file in messages; default the path.
+        text: text to read instead of that of the file.
+        link: link or body from which down the robot is read, of the only tree or of several; "" for
+            all of it.
 
     Raises:
         DescriptionError: it is neither, or not a tree of links; the message gives file and line.
@@ -41,4 +50,5 @@ def describe(path: Path, shown: str | None = None, text: str | None = None) -> D
     if root.tag not in READERS:
         cause = f"the root element is <{root.tag}>; a URDF has <robot>, an MJCF model <mujoco>"
         raise root.error(cause)
-    return READERS[root.tag](root)
+    found = READERS[root.tag](root, link)
+    return found.below(link) if link else found

@@ -35,8 +35,12 @@ def read(path: Path, shown: str | None = None) -> Description:
     return from_xml(read_file(path, shown))
 
 
-def from_xml(root: Element) -> Description:
+def from_xml(root: Element, link: str = "") -> Description:
     """Read the root element of a URDF.
+
+    Args:
+        root: the element.
+        link: a link of the tree that is read, where there are several; "" for one tree.
 
     Raises:
         DescriptionError: not a URDF, or not a tree of links; the message gives the line.
@@ -58,6 +62,11 @@ def from_xml(root: Element) -> Description:
         joints[joint.name] = joint
     file = root.where.file
     joints, loops = _without_loops(joints)
+    if link in links:
+        links = {
+            name: own for name, own in links.items() if _top(name, joints) == _top(link, joints)
+        }
+        joints = {name: own for name, own in joints.items() if own.child in links}
     top = root_of(file, links, joints)
     return Description(
         root.attributes.get("name", ""),
@@ -70,6 +79,16 @@ def from_xml(root: Element) -> Description:
         loops=loops,
         floats=True if any(joint.type == "floating" for joint in joints.values()) else None,
     )
+
+
+def _top(link: str, joints: dict[str, Joint]) -> str:
+    """Root of the tree of a link; in a cycle, a link of it."""
+    above = {joint.child: joint.parent for joint in joints.values()}
+    seen: set[str] = set()
+    while link in above and link not in seen:
+        seen.add(link)
+        link = above[link]
+    return link
 
 
 def _without_loops(joints: dict[str, Joint]) -> tuple[dict[str, Joint], tuple[Loop, ...]]:

@@ -221,7 +221,7 @@ def translate(
     source = source if isinstance(source, Source) else Source(source, source.stem)
     path = source.path
     meshes = Meshes(path.parent)
-    description = weighed(describe(path, shown, source.text), meshes)
+    description = weighed(describe(path, shown, source.text, options.root), meshes)
     doubts = plausibility.check(description)
     description, axis = upright(description)
     if axis:

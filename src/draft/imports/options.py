@@ -21,6 +21,7 @@ class Options:
         strict: whether an implausible torque refuses the file, instead of being replaced.
         knee_drive: where the knees' drives of a quadruped sit; None to judge by geometry.
         without: keys of surveyed robots that no guess may rest on.
+        root: link or body that is the base of what is imported; "" for the file's own.
     """
 
     torque: Stated = field(default_factory=Stated)
@@ -28,3 +29,4 @@ class Options:
     strict: bool = False
     knee_drive: KneeDrive | None = None
     without: Collection[str] = ()
+    root: str = ""
