@@ -124,6 +124,7 @@ class Column(NamedTuple):
     """A driven hinge of a limb in a pose.
 
     Attributes:
+        body: index of the body that it moves.
         name: full name of the joint.
         actuator: its actuator.
         axis: its unit axis in the world.
@@ -131,6 +132,7 @@ class Column(NamedTuple):
         torque: torque that holds what it moves against gravity, per g [kg m].
     """
 
+    body: int
     name: str
     actuator: Actuator
     axis: Vector
@@ -174,6 +176,7 @@ def columns(design: Design, limb: Limb, frames: Mapping[int, Frame]) -> tuple[Co
         axis = g.rotate(turned, joint.axis)
         found.append(
             Column(
+                body=k,
                 name=design.bodies[k].prefix + joint.name,
                 actuator=design.actuators[joint.actuator],
                 axis=axis,

@@ -10,17 +10,20 @@ stretch the arm away from its shoulder, the others turn it to the horizontal.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable
 from typing import NamedTuple
 
 from draft import geometry as g
 from draft.design import Design
 from draft.design.cached import once
+from draft.design.legs import GRAVITY, LegJoint
 from draft.design.limbs import Column, Limb, columns, frames_at, limbs
+from draft.design.loads import Load
 from draft.geometry import Frame, Rotation, Vector
 from draft.values import Mask, Value, atan2, both, cos, either, hypot, maximum, sin, some, where
 
-STRETCHING, TURNING = 4, 6  # sweeps
+SWEEPS = 40  # at most, outwards and back; two for most arms
+_STILL = 1e-12  # of the length of the arm: a sweep that gains less is the last
 _TINY = 1e-9  # of the length of the arm: what moves the tip by less is rounding error
 
 
@@ -32,7 +35,6 @@ class Segment(NamedTuple):
         place: its origin and rotation in the frame of the body before it, or in the world [m].
         axis: unit axis in its own frame.
         low, high: its range [rad]; a joint without limits has a whole turn.
-        home: its home angle [rad].
     """
 
     body: int
@@ -40,7 +42,6 @@ class Segment(NamedTuple):
     axis: Vector
     low: Value
     high: Value
-    home: Value
 
 
 class Chain(NamedTuple):
@@ -62,7 +63,7 @@ def chain(design: Design, limb: Limb) -> Chain:
             frame = placed if joint is None else body.moved(placed, joint.home)
             continue
         low, high = (-math.pi, math.pi) if joint.continuous else joint.range
-        found.append(Segment(k, placed, joint.axis, low, high, joint.home))
+        found.append(Segment(k, placed, joint.axis, low, high))
         frame = g.ORIGIN
     tip = g.add(frame[0], g.rotate(frame[1], limb.point))
     return Chain(tuple(found), tip)
@@ -73,11 +74,11 @@ class Stretch(NamedTuple):
 
     Attributes:
         reach: that distance [m].
-        joints: its driven hinges in that pose.
+        loads: loads of its joints in that pose, per mass of a payload at the tip.
     """
 
     reach: Value
-    joints: tuple[Column, ...]
+    loads: tuple[Load, ...]
 
 
 @once
@@ -89,11 +90,19 @@ def stretched(design: Design) -> Stretch | None:
     search = _Search(chain(design, arm))
     search.run()
     angles = dict(zip(arm.joints, search.angles, strict=True))
-    return Stretch(search.reach(), columns(design, arm, frames_at(design, angles)))
+    found = columns(design, arm, frames_at(design, angles))
+    return Stretch(search.reach(), tuple(map(_load, found, search.angles)))
+
+
+def _load(column: Column, angle: Value) -> Load:
+    sweep, _, lift = column.arm
+    names, actuator, hang = (column.name,), column.actuator, column.torque
+    joint = LegJoint(column.body, names, actuator, angle, lift, sweep, hang)
+    return Load(joint, actuator, GRAVITY * hang, GRAVITY * lift)
 
 
 class _Search:
-    """Search for the pose, from the home pose.
+    """Search for the pose, from the middle of the ranges.
 
     The shoulder is the point on the axis of the first joint that is nearest to the origin of the
     second, or to the tip of an arm of one joint.
@@ -101,83 +110,85 @@ class _Search:
 
     def __init__(self, of: Chain) -> None:
         self.of, self.n = of.segments, len(of.segments)
-        self.angles: list[Value] = [one.home for one in self.of]
-        # Tip in the frame of each joint, before the joint turns it.
+        self.angles: list[Value] = [0.5 * (one.low + one.high) for one in self.of]
+        # Tip in the frame of each joint, and that frame in the world, before the joint turns.
         self.tips: list[Vector] = [of.tip] * self.n
-        self.frames: list[Frame] = [g.ORIGIN] * self.n  # of each joint in the world, before it turns
+        self.frames: list[Frame] = [g.ORIGIN] * self.n
         self.length = g.norm(of.tip) + g.total(g.norm(one.place[0]) for one in self.of[1:])
-        for j in reversed(range(self.n)):
-            self._inwards(j)
-        for j in range(self.n):
-            self._outwards(j)
+        self._rising: Mask = True
+        self._inward()
+        self._outward()
         first = self.of[0]
         next_one = self.of[1].place[0] if self.n > 1 else of.tip
         along = g.scale(first.axis, g.dot(first.axis, next_one))
         self.shoulder = g.add(first.place[0], g.rotate(first.place[1], along))
 
     def run(self) -> None:
-        """Straighten the arm, stretch it, and turn it to the horizontal."""
+        """Straighten the arm from its tip inwards, stretch it, and turn it to the horizontal."""
+        self._inward(self._straighten)
+        self._outward(self._stretch)
+        self._inward(self._stretch)
+        before = self.reach()
+        for _ in range(SWEEPS):
+            self._outward(self._turn)
+            self._inward(self._turn)
+            self._rising = self.reach() - before > _STILL * self.length
+            if not some(self._rising):
+                break
+            before = self.reach()
+
+    def _inward(self, step: Callable[[int], Value] | None = None) -> None:
+        """Take a step for each joint from the last to the first; frames before it are known."""
         for j in reversed(range(self.n)):
-            self._inwards(j)
-            self._straighten(j)
-        for sweep in range(STRETCHING + TURNING):
-            stretch = sweep < STRETCHING
-            if not sweep % 2:
-                for j in range(self.n):
-                    self._outwards(j)
-                    self._stretch(j) if stretch else self._turn(j)
-            else:
-                for j in reversed(range(self.n)):
-                    self._inwards(j)
-                    self._stretch(j) if stretch else self._turn(j)
-        for j in reversed(range(self.n)):
-            self._inwards(j)
+            if j < self.n - 1:
+                after = self.of[j + 1]
+                at, rotation = after.place
+                moved = turned(after.axis, self.angles[j + 1], self.tips[j + 1])
+                self.tips[j] = g.add(at, g.rotate(rotation, moved))
+            self._take(step, j)
+
+    def _outward(self, step: Callable[[int], Value] | None = None) -> None:
+        """Take a step for each joint from the first to the last; tips after it are known."""
+        for j in range(self.n):
+            origin, rotation = g.ORIGIN
+            if j:
+                origin, rotation = self.frames[j - 1]
+                turn = g.about(self.of[j - 1].axis, self.angles[j - 1])
+                rotation = g.compose(rotation, turn)
+            at, placed = self.of[j].place
+            here = g.add(origin, g.rotate(rotation, at))
+            self.frames[j] = (here, g.compose(rotation, placed))
+            self._take(step, j)
+
+    def _take(self, step: Callable[[int], Value] | None, j: int) -> None:
+        # Designs that have arrived stay, so that N of them end where each alone does.
+        if step is not None:
+            self.angles[j] = where(self._rising, step(j), self.angles[j])
 
     def reach(self) -> Value:
         """Distance of the tip from the shoulder along the horizontal [m]."""
         x, y, _ = self._from_shoulder(0, self.angles[0])
         return hypot(x, y)
 
-    def _outwards(self, j: int) -> None:
-        """Frame of a joint in the world, from that of the joint before it."""
-        origin, rotation = g.ORIGIN
-        if j:
-            before = self.of[j - 1]
-            origin, rotation = self.frames[j - 1]
-            rotation = g.compose(rotation, g.about(before.axis, self.angles[j - 1]))
-        at, turned = self.of[j].place
-        here = g.add(origin, g.rotate(rotation, at))
-        self.frames[j] = (here, g.compose(rotation, turned))
-
-    def _inwards(self, j: int) -> None:
-        """Tip in the frame of a joint, from that in the frame of the joint after it."""
-        if j == self.n - 1:
-            return
-        after = self.of[j + 1]
-        at, turned = after.place
-        moved = _turned(after.axis, self.angles[j + 1], self.tips[j + 1])
-        self.tips[j] = g.add(at, g.rotate(turned, moved))
-
     def _from_shoulder(self, j: int, angle: Value) -> Vector:
         """Vector from the shoulder to the tip in the world, with a joint at an angle [m]."""
         origin, rotation = self.frames[j]
-        tip = g.rotate(rotation, _turned(self.of[j].axis, angle, self.tips[j]))
+        tip = g.rotate(rotation, turned(self.of[j].axis, angle, self.tips[j]))
         return g.subtract(g.add(origin, tip), self.shoulder)
 
-    def _straighten(self, j: int) -> None:
-        """Turn a joint so that the tip is furthest from the nearest joint before it that it can."""
+    def _straighten(self, j: int) -> Value:
+        """Angle of a joint with the tip furthest from the last joint before it that sees it."""
         kept, waits = self.angles[j], True
         for k in reversed(range(j)):
             angle, idle = self._away(j, self.frames[k][0] if k else self.shoulder)
             kept, waits = where(waits, angle, kept), both(waits, idle)
             if not some(waits):
                 break
-        self.angles[j] = kept
+        return kept
 
-    def _stretch(self, j: int) -> None:
-        """Turn a joint so that the tip is furthest from the shoulder."""
-        if j:
-            self.angles[j], _ = self._away(j, self.shoulder)
+    def _stretch(self, j: int) -> Value:
+        """Angle of a joint with the tip furthest from the shoulder, which is on the first axis."""
+        return self._away(j, self.shoulder)[0] if j else self.angles[0]
 
     def _away(self, j: int, point: Vector) -> tuple[Value, Mask]:
         """Angle of a joint with the tip furthest from a point, and whether the joint is idle."""
@@ -185,16 +196,21 @@ class _Search:
         away = _unrotated(rotation, g.subtract(origin, point))
         return self._best(j, away, self.length)
 
-    def _turn(self, j: int) -> None:
-        """Turn a joint so that the tip is furthest along its direction, or against it."""
+    def _turn(self, j: int) -> Value:
+        """Angle of a joint with the tip furthest along its direction, or against it."""
         x, y, _ = self._from_shoulder(j, self.angles[j])
+        above = hypot(x, y) <= _TINY * self.length
+        if some(above):  # Above or below the shoulder every direction is as good: that of motion.
+            motion = g.cross(self.of[j].axis, turned(self.of[j].axis, self.angles[j], self.tips[j]))
+            u, v, _ = g.rotate(self.frames[j][1], motion)
+            x, y = where(above, u, x), where(above, v, y)
         size = maximum(hypot(x, y), _TINY * self.length)
         along = _unrotated(self.frames[j][1], (x / size, y / size, 0.0))
         ahead, _ = self._best(j, along, 1.0)
         back, _ = self._best(j, g.scale(along, -1.0), 1.0)
         found = [self._from_shoulder(j, angle) for angle in (ahead, back)]
         gain = hypot(*found[1][:2]) - hypot(*found[0][:2])
-        self.angles[j] = where(gain > _TINY * self.length, back, ahead)
+        return where(gain > _TINY * self.length, back, ahead)
 
     def _best(self, j: int, direction: Vector, unit: Value) -> tuple[Value, Mask]:
         """Angle in the range of a joint at which the tip is furthest along a direction.
@@ -218,7 +234,7 @@ class _Search:
         return where(idle, self.angles[j], best), idle
 
 
-def _turned(axis: Vector, angle: Value, v: Vector) -> Vector:
+def turned(axis: Vector, angle: Value, v: Vector) -> Vector:
     """Vector turned about a unit axis (Rodrigues' formula)."""
     along = g.scale(axis, g.dot(axis, v))
     c, s = cos(angle), sin(angle)
