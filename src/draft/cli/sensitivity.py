@@ -20,7 +20,7 @@ from draft.cli.settings_options import with_options
 from draft.errors import DraftError
 from draft.explore.settings import EffectSettings
 from draft.metrics import LEARNED, find
-from draft.metrics.registry import USUAL, of_base
+from draft.metrics.registry import USUAL, of_spec
 from draft.values import brief, signed
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def main(
     with if_interrupted(NOTHING), x.bar("bodies") if learned else nullcontext() as progress:
         found = sensitivity(
             resolved,
-            of or (() if json else tuple(of_base(resolved.floating, USUAL))),
+            of or (() if json else tuple(of_spec(resolved.spec, USUAL))),
             by,
             seed=seed,
             replicas=rolled.replicas,
@@ -134,7 +134,7 @@ def _over_ranges(
     if vary and screen is not None:
         raise DraftError("both --vary and --screen give ranges", "omit one of them")
     chosen = vary if screen is None else ranges_of_screen(screen)
-    usual = () if json else tuple(of_base(design.floating, USUAL))
+    usual = () if json else tuple(of_spec(design.spec, USUAL))
     found = sobol_indices(design, chosen, of or usual, n=n, seed=seed)
     if figure is not None:
         from draft.explore.sensitivity_figure import save_indices

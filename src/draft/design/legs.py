@@ -201,7 +201,7 @@ def _joints(
     """Hinges of a leg with their lever arms."""
     bodies, run = design.bodies, runs[0]
     foot = tip(bodies[run[-1]], frames[run[-1]])
-    moments = _moments(design, frames)
+    below = moments(design, frames)
     found = []
     for place, k in enumerate(run):
         joint = bodies[k].joint
@@ -218,7 +218,7 @@ def _joints(
                 angle=angles.get(k, 0.0),
                 lift=axis[0] * r[1] - axis[1] * r[0],
                 sweep=axis[1] * r[2] - axis[2] * r[1],
-                hang=_hang(axis, origin, moments[k]),
+                hang=hang(axis, origin, below[k]),
             )
         )
     return tuple(found)
@@ -227,7 +227,7 @@ def _joints(
 def held_joints(design: Design) -> tuple[LegJoint, ...]:
     """Hinges of a fixed base in the home pose, each alone; no floor lifts them."""
     frames = dict(enumerate(design.frames(home=True)))
-    moments = _moments(design, frames)
+    below = moments(design, frames)
     return tuple(
         LegJoint(
             body=k,
@@ -236,33 +236,33 @@ def held_joints(design: Design) -> tuple[LegJoint, ...]:
             angle=joint.home,
             lift=0.0,
             sweep=0.0,
-            hang=_hang(g.rotate(frames[k][1], joint.axis), frames[k][0], moments[k]),
+            hang=hang(g.rotate(frames[k][1], joint.axis), frames[k][0], below[k]),
         )
         for k, body in enumerate(design.bodies)
         if (joint := body.joint) is not None and not joint.slide
     )
 
 
-def _hang(axis: Vector, origin: Vector, moment: Vector) -> Value:
+def hang(axis: Vector, origin: Vector, moment: Vector) -> Value:
     """First moment of the bodies below a hinge, sum of m dz/dq [kg m/rad]."""
     mass, x, y = moment
     return axis[0] * (y - mass * origin[1]) - axis[1] * (x - mass * origin[0])
 
 
-def _moments(design: Design, frames: Mapping[int, Frame]) -> dict[int, Vector]:
+def moments(design: Design, frames: Mapping[int, Frame]) -> dict[int, Vector]:
     """Mass [kg] and first moments along x and y [kg m] of each body with all below it."""
-    moments: dict[int, Vector] = {}
+    found: dict[int, Vector] = {}
     for k in frames:
         body = design.bodies[k]
         origin, rotation = frames[k]
         point = g.rotate(rotation, _first_moment(body))
         mass = body.mass
-        moments[k] = (mass, point[0] + mass * origin[0], point[1] + mass * origin[1])
+        found[k] = (mass, point[0] + mass * origin[0], point[1] + mass * origin[1])
     for k in reversed(list(frames)):
         parent = design.bodies[k].parent
-        if parent in moments:
-            moments[parent] = g.add(moments[parent], moments[k])
-    return moments
+        if parent in found:
+            found[parent] = g.add(found[parent], found[k])
+    return found
 
 
 def _first_moment(body: Body) -> Vector:

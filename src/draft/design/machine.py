@@ -1,16 +1,27 @@
-"""What kind of machine a design is taken for, in words."""
+"""What kind of machine a design is taken for, in words and for metrics."""
 
 from __future__ import annotations
 
 from draft.design.design import Design
 from draft.design.legs import count
+from draft.design.limbs import branches
 from draft.errors import counted
+from draft.spec import Spec
+
+
+def kinds(spec: Spec) -> frozenset[str]:
+    """Kinds of machine of a robot: "floating", or "fixed" with "arm", "hand", both or neither."""
+    if spec.floating:
+        return frozenset({"floating"})
+    arm, fingers = branches(spec)
+    return frozenset({"fixed", *(["arm"] if arm else []), *(["hand"] if fingers else [])})
 
 
 def machine(design: Design) -> str:
     """Kind of machine of a design.
 
-    A fixed base with joints on one chain is that of an arm, on several that of a hand.
+    A fixed base with driven joints on one chain is that of an arm, with several branches that of a
+    hand.
 
         >>> machine(draft.load("quadruped").resolve())
         'robot on 4 legs'
@@ -20,12 +31,8 @@ def machine(design: Design) -> str:
         if legs:
             return f"robot on {counted(legs, 'leg')}"
         return "robot on feet without knees" if design.feet else "floating robot without legs"
-    chains: set[int] = set()
-    top: list[int] = [0]  # body on the base that each body is attached to
-    for i, body in enumerate(design.bodies[1:], start=1):
-        top.append(top[body.parent] if body.parent else i)
-        if body.joint is not None:
-            chains.add(top[i])
-    if not chains:
-        return "fixed base without joints"
-    return "fixed arm" if len(chains) == 1 else f"hand of {len(chains)} fingers on a fixed base"
+    arm, fingers = branches(design.spec)
+    hand = f"hand of {len(fingers)} fingers"
+    if arm:
+        return f"fixed arm with a {hand}" if fingers else "fixed arm"
+    return f"{hand} on a fixed base" if fingers else "fixed base without driven joints"

@@ -162,7 +162,7 @@ def compare(
         raise DraftError("comparisons are of single designs", "select one, such as `design[0]`")
     metrics = closed_metrics(designs[0].spec, of)
     if not of:
-        metrics = tuple(x for x in metrics if all(find(x).fits(one.floating) for one in designs))
+        metrics = tuple(x for x in metrics if all(find(x).fits(one.spec) for one in designs))
     # A metric of an extension that fails is NaN unless it is named.
     measure = partial(of_design, names=metrics if of else None)
     table = [measure(one) for one in designs]

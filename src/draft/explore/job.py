@@ -30,7 +30,7 @@ from draft.laws import actuators, catalogue, structure
 from draft.learn.measuring.evaluation_options import LearnedMetrics
 from draft.learn.measuring.policy_metrics import digest
 from draft.metrics.measure import needs_more
-from draft.metrics.registry import misfit, of_base
+from draft.metrics.registry import closed, misfit, of_spec
 from draft.spec import Spec
 from draft.spec.payload import with_payload
 from draft.spec.relative import merged
@@ -252,11 +252,10 @@ def needs_policy(names: Iterable[str]) -> bool:
 def _metrics(
     spec: Spec, kind: str, names: Sequence[str] | None, axes: Sequence[Axis]
 ) -> tuple[str, ...]:
-    own = of_base(spec.floating).values()
-    known = [x.name for x in own if x.needs == "design" or kind == "sweep"]
+    known = of_spec(spec) if kind == "sweep" else closed(spec)
     chosen = known if names is None else list(dict.fromkeys(names))
     for name in chosen:
-        if (problem := misfit(name, spec.floating)) is not None:
+        if (problem := misfit(name, spec)) is not None:
             raise DraftError(problem)
         if m.find(name).needs != "design" and kind != "sweep":
             raise DraftError(needs_more(m.find(name)))

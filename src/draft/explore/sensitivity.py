@@ -22,7 +22,7 @@ from draft.errors import DraftError, suggest
 from draft.explore.settings import EffectSettings, Progress
 from draft.metrics import LEARNED, find, of_design
 from draft.metrics.measure import needs_more, of_batch
-from draft.metrics.registry import misfit, of_base, reads_verdict
+from draft.metrics.registry import closed, misfit, reads_verdict
 from draft.spec import Spec
 from draft.spec.check import key_problem
 from draft.spec.payload import with_payload
@@ -350,11 +350,10 @@ def closed_metrics(spec: Spec, of: Sequence[str], models: bool = False) -> tuple
         DraftError: one is unknown, or needs a model or a policy.
     """
     if not of:
-        closed = (one for one in of_base(spec.floating).values() if one.needs == "design")
-        return tuple(one.name for one in closed if one.unit != "bool")
+        return tuple(name for name in closed(spec) if find(name).unit != "bool")
     for name in of:
         metric = find(name)
-        if (problem := misfit(name, spec.floating)) is not None:
+        if (problem := misfit(name, spec)) is not None:
             raise DraftError(problem)
         allowed = metric.needs == "design" or (models and metric.needs == "model" and metric.batch)
         if not allowed:

@@ -21,7 +21,7 @@ from draft.explore.quantiles import Quantile, names, split
 from draft.laws.quantities import QUANTITIES
 from draft.metrics import LEARNED, METRICS, find, of_design
 from draft.metrics.learned import PREFIX
-from draft.metrics.registry import RENAMED, misfit, of_base, unknown
+from draft.metrics.registry import RENAMED, misfit, of_spec, unknown
 from draft.spec import Spec
 from draft.spec.expressions import Expression, parse
 from draft.values import Value
@@ -113,7 +113,7 @@ def _metrics(spec: Spec, expression: Expression) -> set[str]:
 def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
     owner, dot, quantity = name.partition(".")
     if name in LEARNED or (name in METRICS and name not in spec.parameters):
-        problem = misfit(name, spec.floating)
+        problem = misfit(name, spec)
         return None if problem is None else replace(problem, where=where)
     if not dot:
         if name in spec.parameters or name == ACCEPTED:
@@ -123,7 +123,7 @@ def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
             return Problem(f"'{name}' is an actuator class, not a number", where, remedy)
         if name in RENAMED:
             return replace(unknown(name), where=where)
-        known = [*spec.parameters, *of_base(spec.floating), ACCEPTED]
+        known = [*spec.parameters, *of_spec(spec), ACCEPTED]
         remedy = suggest(name, known, "parameters and metrics")
         return Problem(f"unknown name '{name}'", where, remedy)
     if dot and f"{owner}." == PREFIX and owner not in spec.actuators:

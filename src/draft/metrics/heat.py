@@ -16,7 +16,13 @@ from draft.errors import DraftError
 from draft.laws import limits
 from draft.metrics.registry import metric
 from draft.metrics.speed import top_speed
-from draft.metrics.statics import payload_at, payload_limits, standing_torque_rated
+from draft.metrics.statics import (
+    carrying,
+    least,
+    payload_at,
+    payload_limits,
+    standing_torque_rated,
+)
 from draft.metrics.walking import DUTY, joint_rate, stance_torque, swing_torque
 from draft.values import Mask, Value, divide, exp, maximum, sqrt, where
 
@@ -31,15 +37,14 @@ HOUR = 3600.0
 
 @metric(
     unit="kg",
-    formula=f"min of (share tau_rated - tau sign) / |(g / n) dz_foot/dq| in the crouch, share = "
-    f"{limits.torque_for(HOUR):.3f}",
+    formula=f"as payload_rated with {limits.torque_for(HOUR):.3f} tau_rated",
     source=_OVERLOAD,
     better="more",
     limits=payload_limits(limits.torque_for(HOUR)),
-    base="floating",
+    base="floating or arm",
 )
 def payload_hour(design: Design) -> Value:
-    """Mass on the trunk that the robot can hold in the crouch for an hour [kg].
+    """Mass on the trunk in the crouch, or at the tip of an arm at its reach, held for an hour [kg].
 
     Beside what it carries already. `payload_for` gives other times, and the 90 % band.
     """
@@ -52,10 +57,9 @@ def payload_hour(design: Design) -> Value:
     f"{_STALLED.exponent:.2f} at the worst joint in the home pose",
     source=_OVERLOAD,
     better="more",
-    base="floating",
 )
 def hold_time(design: Design) -> Value:
-    """Time that the robot can stand in the home pose with what it carries [s].
+    """Time that the robot can hold the home pose with what it carries [s].
 
     inf if every joint can hold its torque without end. Stalled actuators of one vendor: half of the
     modules held out are within a factor of two of the predicted time, 90 % within `hold_time_fold`.
@@ -65,13 +69,27 @@ def hold_time(design: Design) -> Value:
     return limits.hold_time(standing_torque_rated(design))
 
 
+@metric(
+    unit="s",
+    formula="as hold_time, with payload_peak at the tip of the arm at its reach",
+    source=_OVERLOAD,
+    better="more",
+    base="arm",
+)
+def payload_peak_time(design: Design) -> Value:
+    """Time that the arm can hold its payload_peak at its reach, until a joint is too hot [s]."""
+    mass = payload_at(design, math.inf)
+    torques = ((abs(x.torque + mass * x.per_mass), x.actuator) for x in carrying(design))
+    return least(limits.hold_time(divide(torque, a.rated_torque)) for torque, a in torques)
+
+
 def hold_time_fold() -> float:
     """Fold within which 90 % of modules held out are of the predicted time to hold a torque."""
     return _STALLED.band(0.9)
 
 
 class Payload(NamedTuple):
-    """Mass on the trunk [kg] that can be held for a time, and the ends of its 90 % band."""
+    """Mass [kg] that can be held for a time, and the ends of its 90 % band."""
 
     mass: Value
     low: Value
@@ -79,7 +97,7 @@ class Payload(NamedTuple):
 
 
 def payload_for(design: Design, seconds: float) -> Payload:
-    """Mass on the trunk that the robot can hold in the crouch for a time [kg].
+    """Mass that can be held for a time [kg]: on the trunk in the crouch, or by an arm at its reach.
 
     The band has the error of the time that a stalled module holds a torque, and that of the rated
     torque where it is not the part's own; the peak torque limits both. Its ends are negative where
@@ -103,7 +121,7 @@ def payload_for(design: Design, seconds: float) -> Payload:
     share, less, more = (limits.torque_for(seconds, f) for f in (1.0, 1.0 / fold, fold))
     widths = [
         half_widths(a, of=("rated_torque",)).get("rated_torque", 0.0)
-        for a in {id(x.actuator): x.actuator for x in loads(design)}.values()
+        for a in {id(x.actuator): x.actuator for x in carrying(design)}.values()
     ]
     width = maximum(*widths) if widths else 0.0
     down, up = (sqrt(width * width + math.log(end / share) ** 2) for end in (less, more))

@@ -1,6 +1,6 @@
-"""Impact metrics of a foot, from the joint-space inertia M(q) of models in the crouch.
+"""Impact metrics of a foot or a tip, from the joint-space inertia M(q) of models.
 
-The robot floats, its joints are free, rotor inertia is included (MuJoCo's armature), and no force
+A robot on feet is in the crouch and floats, an arm or a hand is at home. Joints are free, rotor inertia is included (MuJoCo's armature), and no force
 but that of the impact acts. The apparent mass of a foot along a direction n is
 1 / (n J M^-1 J' n) (Khatib 1987).
 
@@ -13,15 +13,17 @@ from __future__ import annotations
 import copy
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from draft.design.cached import once
 from draft.design.legs import legs
+from draft.design.limbs import limbs
+from draft.geometry import Vector
 from draft.metrics.registry import metric
+from draft.metrics.tips import directions, outer_columns
 from draft.values import Array, Value, scalar
 
 if TYPE_CHECKING:
@@ -95,6 +97,36 @@ def reflected_share(model: Model | ModelBatch) -> Value:
     return _extreme(np.maximum, [share], model)
 
 
+@metric(
+    unit="kg",
+    formula="max over directions u of 1 / (u J M^-1 J' u) at home, over those in which the tip "
+    "can move",
+    source="Khatib 1995, IJRR 14(1)",
+    better="less",
+    needs="model",
+    batch=True,
+    base="arm or hand",
+)
+def reflected_mass(model: Model | ModelBatch) -> Value:
+    """Largest apparent mass of the tip in the home pose, rotors included [kg].
+
+    Joints that are not of the limb are held. Of several fingers the heaviest counts.
+    """
+    design, robot = model.design, _template(model)
+    outer = limbs(design).outer
+    homes = {name: joint.home for name, joint in design.joints.items()}
+    points = [(design.bodies[limb.path[-1]].name, limb.point) for limb in outer]
+    found = pose_inertia(model, homes, points)
+    masses: list[Array] = []
+    for i, columns in enumerate(outer_columns(design)):
+        dofs = [int(robot.joint(x.name).dofadr[0]) for x in columns]
+        inertia, rows = found.inertia[:, dofs][:, :, dofs], found.jacobians[:, i][:, :, dofs]
+        mobility = rows @ np.linalg.solve(inertia, rows.swapaxes(1, 2))
+        # Ascending eigenvalues; those of directions in which it cannot move come first.
+        masses.append(1.0 / np.linalg.eigvalsh(mobility)[:, 3 - directions(columns)])
+    return _extreme(np.maximum, masses, model)
+
+
 def _many(model: Model | ModelBatch) -> ModelBatch | None:
     """A batch of models; None for one model. No type is asked for: that would load MuJoCo."""
     return None if model.design.count is None else cast("ModelBatch", model)
@@ -153,24 +185,63 @@ def _apparent(inertia: Array, rows: Array) -> Array:
 @once
 def crouch_inertia(model: Model | ModelBatch) -> CrouchInertia:
     """M(q) and the vertical motion of the feet in the crouch."""
+    design = model.design
+    angles = {name: j.angle for leg in legs(design) for j in leg.joints for name in j.names}
+    feet = [design.bodies[foot] for leg in legs(design) for foot in leg.feet]
+    found = pose_inertia(model, angles, [(body.name, body.link.tip) for body in feet])
+    rows = {body.name: found.jacobians[:, i, 2] for i, body in enumerate(feet)}
+    return CrouchInertia(found.inertia, rows, found.armature)
+
+
+class PoseInertia(NamedTuple):
+    """Inertia of one or more models in a pose.
+
+    Attributes:
+        inertia: M(q), shape (models, nv, nv).
+        jacobians: dx/dq of points in the world, shape (models, points, 3, nv).
+        armature: of every degree of freedom, shape (models, nv).
+    """
+
+    inertia: Array
+    jacobians: Array
+    armature: Array
+
+
+def pose_inertia(
+    model: Model | ModelBatch, angles: Mapping[str, Value], points: Sequence[tuple[str, Vector]]
+) -> PoseInertia:
+    """M(q) and the motion of points in a pose.
+
+    Args:
+        model: one model, or a batch.
+        angles: angles by joint [rad]; others are zero.
+        points: name of the body of each point, and its place in the frame of that body [m].
+    """
     import mujoco
 
     robot = copy.copy(_template(model))
     data = mujoco.MjData(robot)
     data.qpos[:] = 0.0
-    data.qpos[3] = 1.0
-    joints, angles = _angles(model, robot)
-    bodies, tips = _feet(model)
-    ids = [robot.body(name).id for name in bodies]
+    if model.design.floating:
+        data.qpos[3] = 1.0
     n = _count(model)
-    inertia, rows = np.empty((n, robot.nv, robot.nv)), np.empty((n, len(ids), robot.nv))
-    armature, jacobian = np.empty((n, robot.nv)), np.empty((3, robot.nv))
+    joints = np.array([int(robot.joint(name).qposadr[0]) for name in angles], dtype=np.intp)
+    poses = np.empty((n, len(angles)))
+    for i, angle in enumerate(angles.values()):
+        poses[:, i] = _each(model, angle)
+    tips = np.empty((n, len(points), 3))
+    for i, (_, point) in enumerate(points):
+        for k, value in enumerate(point):
+            tips[:, i, k] = _each(model, value)
+    ids = [robot.body(name).id for name, _ in points]
+    inertia = np.empty((n, robot.nv, robot.nv))
+    jacobians, armature = np.empty((n, len(ids), 3, robot.nv)), np.empty((n, robot.nv))
     numbers = _numbers(model, robot)
     places, turns = data.xpos, data.xmat.reshape(-1, 3, 3)
     for k in range(n):
         for view, values in numbers:
             view[:] = values[k]
-        data.qpos[joints] = angles[k]
+        data.qpos[joints] = poses[k]
         mujoco.mj_kinematics(robot, data)
         mujoco.mj_comPos(robot, data)
         mujoco.mj_makeM(robot, data)
@@ -178,9 +249,8 @@ def crouch_inertia(model: Model | ModelBatch) -> CrouchInertia:
         armature[k] = robot.dof_armature
         for i, here in enumerate(ids):
             point = places[here] + turns[here] @ tips[k, i]
-            mujoco.mj_jac(robot, data, jacobian, None, point, here)
-            rows[k, i] = jacobian[2]
-    return CrouchInertia(inertia, {name: rows[:, i] for i, name in enumerate(bodies)}, armature)
+            mujoco.mj_jac(robot, data, jacobians[k, i], None, point, here)
+    return PoseInertia(inertia, jacobians, armature)
 
 
 def _template(model: Model | ModelBatch) -> mujoco.MjModel:
@@ -211,23 +281,3 @@ def _each(model: Model | ModelBatch, value: Value) -> Array:
     if batch is None:
         return np.array([scalar(value)])
     return np.broadcast_to(value, (model.design.count or 1,))[batch.rows]
-
-
-def _angles(model: Model | ModelBatch, robot: mujoco.MjModel) -> tuple[NDArray[np.intp], Array]:
-    """Places in qpos of the legs' joints, and their angles [rad], shape (models, joints)."""
-    names = [(name, j.angle) for leg in legs(model.design) for j in leg.joints for name in j.names]
-    angles = np.empty((_count(model), len(names)))
-    for i, (_, angle) in enumerate(names):
-        angles[:, i] = _each(model, angle)
-    places = [int(robot.joint(name).qposadr[0]) for name, _ in names]
-    return np.array(places, dtype=np.intp), angles
-
-
-def _feet(model: Model | ModelBatch) -> tuple[list[str], Array]:
-    """Bodies of the feet, and the ends of their links [m], shape (models, feet, 3)."""
-    bodies = [model.design.bodies[foot] for leg in legs(model.design) for foot in leg.feet]
-    tips = np.empty((_count(model), len(bodies), 3))
-    for i, body in enumerate(bodies):
-        for k, value in enumerate(body.link.tip):
-            tips[:, i, k] = _each(model, value)
-    return [body.name for body in bodies], tips

@@ -11,7 +11,7 @@ import numpy as np
 from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.extensions import ExtensionWarning
-from draft.metrics.registry import METRICS, Metric, find, misfit, of_base
+from draft.metrics.registry import METRICS, Metric, find, misfit, of_spec
 from draft.values import Array, Value
 
 if TYPE_CHECKING:
@@ -60,10 +60,10 @@ def _chosen(names: Iterable[str] | None, design: Design) -> list[str]:
         DraftError: an unknown metric, or one of robots with another base.
     """
     if names is None:
-        return [*of_base(design.floating)]
+        return [*of_spec(design.spec)]
     chosen = list(names)
     for name in chosen:
-        if (problem := misfit(name, design.floating)) is not None:
+        if (problem := misfit(name, design.spec)) is not None:
             raise DraftError(problem)
     return chosen
 

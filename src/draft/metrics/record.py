@@ -8,7 +8,7 @@ from typing import Any
 
 from draft.design import Design
 from draft.metrics.measure import of_design, of_model
-from draft.metrics.registry import LEARNED, METRICS, of_base
+from draft.metrics.registry import LEARNED, METRICS, of_spec
 from draft.metrics.statics import joint_margins
 from draft.values import scalar
 
@@ -25,7 +25,7 @@ def measure(design: Design) -> dict[str, float]:
     if design.accepted:
         return of_model(design.build())
     closed = of_design(design)
-    return {name: scalar(closed.get(name, math.nan)) for name in of_base(design.floating)}
+    return {name: scalar(closed.get(name, math.nan)) for name in of_spec(design.spec)}
 
 
 def record(design: Design, found: Mapping[str, float]) -> dict[str, Any]:

@@ -7,15 +7,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+from draft.design.machine import kinds
 from draft.errors import DraftError, Problem, suggest
 from draft.extensions import Registry
 
 if TYPE_CHECKING:
     from draft.metrics.limiting import Limit
+    from draft.spec import Spec
 
 Better = Literal["less", "more", ""]
 Needs = Literal["design", "model", "policy"]
-Base = Literal["any", "floating", "fixed"]
+Base = Literal["any", "floating", "fixed", "arm", "hand", "arm or hand", "floating or arm"]
 F = TypeVar("F", bound=Callable[[Any], Any])
 
 
@@ -36,7 +38,10 @@ class Metric:
             a Model to a float.
         batch: whether a function of a Model also takes a ModelBatch and returns an array of shape
             (models,); otherwise models are built one by one.
-        base: base of the robots that have it, such as "floating" of what is about walking.
+        base: kinds of machine that have it, of `draft.design.machine.kinds`: "floating" for what is
+            about walking, "arm" or "hand" on a fixed base.
+        sampled: whether it takes many poses of each design, thousands of times as long as a closed
+            form: screens, comparisons and sensitivities have it only by name.
         limits: function from one Design to what limits the metric; None if nothing is named.
     """
 
@@ -51,10 +56,11 @@ class Metric:
     batch: bool = False
     limits: Callable[[Any], Iterable[Limit]] | None = None
     base: Base = "any"
+    sampled: bool = False
 
-    def fits(self, floating: bool) -> bool:
-        """Whether robots have it whose base floats, or is fixed to the world."""
-        return self.base in ("any", "floating" if floating else "fixed")
+    def fits(self, spec: Spec) -> bool:
+        """Whether such robots have it."""
+        return self.base == "any" or not kinds(spec).isdisjoint(self.base.split(" or "))
 
 
 METRICS: Registry[Metric] = Registry("metric")
@@ -79,6 +85,7 @@ def metric(
     batch: bool = False,
     limits: Callable[[Any], Iterable[Limit]] | None = None,
     base: Base = "any",
+    sampled: bool = False,
 ) -> Callable[[F], F]:
     """Register a function as a metric and return it unchanged.
 
@@ -97,7 +104,8 @@ def metric(
         needs: "design" for a function of a Design, "model" for one of a Model.
         batch: whether a function of a Model also takes a ModelBatch.
         limits: function from one Design to what limits it (`draft.metrics.limits`).
-        base: base of the robots that have it: "floating" for what is about legs or walking.
+        base: kinds of machine that have it: "floating" for what is about legs or walking.
+        sampled: whether it takes many poses of each design.
 
     Raises:
         DraftError: a metric of this name exists already.
@@ -108,35 +116,53 @@ def metric(
         line = (inspect.getdoc(function) or "").partition("\n")[0]
         sentence = line.removesuffix(f" [{unit}].").removesuffix(".") + "."
         numbers = (name, unit, sentence, formula, source, better, needs, function, batch, limits)
-        made = Metric(*numbers, base)
+        made = Metric(*numbers, base, sampled)
         METRICS.add(name, made, function.__module__)
         return function
 
     return register
 
 
-def of_base(floating: bool, names: Iterable[str] | None = None) -> dict[str, Metric]:
-    """Metrics of robots whose base floats, or is fixed to the world, by name.
+def of_spec(spec: Spec, names: Iterable[str] | None = None) -> dict[str, Metric]:
+    """Metrics of such a machine by name.
 
     Args:
-        floating: whether the base floats.
+        spec: the robot.
         names: those to choose from; None for all.
     """
     chosen = METRICS if names is None else names
-    return {name: METRICS[name] for name in chosen if METRICS[name].fits(floating)}
+    return {name: METRICS[name] for name in chosen if METRICS[name].fits(spec)}
 
 
-def misfit(name: str, floating: bool) -> Problem | None:
-    """Problem of a metric that no robot of such a base has; None for others.
+def closed(spec: Spec) -> tuple[str, ...]:
+    """Names of the metrics of such a machine that are closed forms, which arrays suffice for."""
+    found = of_spec(spec).values()
+    return tuple(one.name for one in found if one.needs == "design" and not one.sampled)
+
+
+def misfit(name: str, spec: Spec) -> Problem | None:
+    """Problem of a metric that no such machine has; None for others.
 
     Raises:
         DraftError: there is no such metric.
     """
-    if find(name).fits(floating):
+    metric = find(name)
+    if metric.fits(spec):
         return None
-    own, other = ("floats", "fixed") if floating else ("is fixed to the world", "floating")
-    known = ", ".join(of_base(floating))
-    return Problem(f"'{name}' is of robots on a {other} base; this one {own}", None, f"use {known}")
+    if spec.floating or metric.base == "floating":
+        other = "floating" if metric.base == "floating" else "fixed"
+        cause = f"robots on a {other} base; this one "
+        cause += "floats" if spec.floating else "is fixed to the world"
+    else:
+        cause = f"a fixed {metric.base}; this one has " + _LACKS.get(metric.base, "no driven joint")
+    return Problem(f"'{name}' is of {cause}", None, f"use {', '.join(of_spec(spec))}")
+
+
+_LACKS = {
+    "arm": "no arm: its driven joints branch at the base",
+    "floating or arm": "no arm: its driven joints branch at the base",
+    "hand": "no fingers: its driven joints do not branch",
+}
 
 
 def reads_verdict(names: Iterable[str]) -> bool:

@@ -10,6 +10,7 @@ from draft.design.cached import once
 from draft.design.legs import legs
 from draft.laws.law import quantile
 from draft.metrics.registry import metric
+from draft.metrics.stretch import stretched
 from draft.values import Value, asin, clip, divide, exp, maximum, sin, some, sqrt
 
 BAND = 0.9
@@ -107,15 +108,24 @@ def leg_length(design: Design) -> Value:
 
 @metric(
     unit="m",
-    formula="distance from hip to ankle at the straightest knee + ankle to floor",
-    source="geometry",
-    base="floating",
+    formula="distance from hip to ankle at the straightest knee + ankle to floor; of an arm max "
+    "over q of |(x, y)_tip - (x, y)_shoulder|",
+    source="geometry; Wang and Chen 1991, IEEE T-RA 7(4), for the steps along one joint of an arm",
+    base="floating or arm",
 )
 def reach(design: Design) -> Value:
-    """Largest height of the axis of the hip above the floor [m].
+    """Largest height of a hip above the floor; of an arm, of its tip from its shoulder, level [m].
 
     The longest kind of leg counts. The knee is as straight as its range allows and the foot is
     level; its radius or height is included.
+
+    The shoulder of an arm is the point on the axis of its first joint that is nearest to the origin
+    of the second: on an upright first axis the distance is that from the axis. All joints are in
+    their ranges; the search along one joint at a time is exact for arms with upright and level
+    axes, and may end at a local best where axes are oblique.
     """
+    stretch = stretched(design)
+    if stretch is not None:
+        return stretch.reach
     heights = [leg.span(leg.bend[0]) + leg.below for leg in legs(design)]
     return maximum(*heights) if heights else math.nan

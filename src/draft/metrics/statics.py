@@ -1,6 +1,7 @@
 """Static torques of the joints, and force and speed of a foot; see `draft.design.loads`.
 
-Unless another pose is named the robot is in the crouch.
+Unless another pose is named a robot on legs is in the crouch, and an arm on a fixed base reaches
+as far as it can (`draft.metrics.stretch`), with its payload at its tip.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from draft.design.legs import GRAVITY
 from draft.design.loads import LegLoad, Load, home_loads, loads
 from draft.metrics.limiting import Limit, at_joint
 from draft.metrics.registry import metric
+from draft.metrics.stretch import stretched
 from draft.values import Value, divide, maximum, minimum, scalar, where
 
 _STATICS = "Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, 3.4"
@@ -58,7 +60,7 @@ def _margin(load: Load) -> Value:
 )
 def torque_margin(design: Design) -> Value:
     """Smallest ratio of peak torque to standing torque of the joints of the legs [1]."""
-    return _least(map(_margin, loads(design)))
+    return least(map(_margin, loads(design)))
 
 
 def _standing_limits(design: Design) -> Iterator[Limit]:
@@ -89,7 +91,7 @@ def payload_limits(share: float) -> Callable[[Design], Iterator[Limit]]:
     """What limits `payload_at` a share of the rated torque [1], of one design."""
 
     def found(design: Design) -> Iterator[Limit]:
-        for x in loads(design):
+        for x in carrying(design):
             rated = share * scalar(x.actuator.rated_torque) <= scalar(x.actuator.peak_torque)
             quantity = "rated torque" if rated else "peak torque"
             yield at_joint(x.joint, x.actuator, quantity, _payload(x, share))
@@ -99,14 +101,15 @@ def payload_limits(share: float) -> Callable[[Design], Iterator[Limit]]:
 
 @metric(
     unit="kg",
-    formula="min of (tau_rated - tau sign) / |(g / n) dz_foot/dq| in the crouch",
+    formula="min of (tau_rated - tau sign) / |(g / n) dz_foot/dq| in the crouch; of an arm with "
+    "g dz_tip/dq at its reach",
     source=_STATICS,
     better="more",
     limits=payload_limits(1.0),
-    base="floating",
+    base="floating or arm",
 )
 def payload_rated(design: Design) -> Value:
-    """Mass on the trunk at which the first joint reaches its rated torque [kg].
+    """Mass on the trunk, or at the tip of an arm at its reach, at a first rated torque [kg].
 
     Below zero the robot cannot hold its own weight at rated torque in the crouch, and is too heavy
     by that mass; `overload` tells the joint. In the home pose, mostly straighter, it may
@@ -118,14 +121,15 @@ def payload_rated(design: Design) -> Value:
 
 @metric(
     unit="kg",
-    formula="min of (tau_peak - tau sign) / |(g / n) dz_foot/dq| in the crouch",
+    formula="min of (tau_peak - tau sign) / |(g / n) dz_foot/dq| in the crouch; of an arm with "
+    "g dz_tip/dq at its reach",
     source=_STATICS,
     better="more",
     limits=payload_limits(math.inf),
-    base="floating",
+    base="floating or arm",
 )
 def payload_peak(design: Design) -> Value:
-    """Mass on the trunk at which the first joint reaches its peak torque [kg].
+    """Mass on the trunk, or at the tip of an arm at its reach, at a first peak torque [kg].
 
     Below zero if a joint cannot hold the robot alone. Heat is neglected: for longer than a few
     seconds the payload is smaller.
@@ -161,14 +165,20 @@ def overload(design: Design) -> Overload | None:
     return worst if worst is not None and worst.torque > worst.rated else None
 
 
+def carrying(design: Design) -> tuple[Load, ...]:
+    """Loads of the joints that carry a payload: of the legs, or of an arm that reaches furthest."""
+    stretch = stretched(design)
+    return loads(design) if stretch is None else stretch.loads
+
+
 def payload_at(design: Design, share: Value) -> Value:
-    """Mass on the trunk at which the first joint reaches a share of its rated torque [kg].
+    """Mass on the trunk, or at the tip of an arm, at which the first joint reaches a share of its rated torque [kg].
 
     Args:
         design: one design, or N.
         share: torque over rated torque [1]; the peak torque limits it.
     """
-    return _least(_payload(x, share) for x in loads(design))
+    return least(_payload(x, share) for x in carrying(design))
 
 
 def _payload(load: Load, share: Value) -> Value:
@@ -193,7 +203,7 @@ def foot_force(design: Design) -> Value:
     It is limited by the first joint that reaches its peak torque. The weight of the leg is
     neglected. The weakest kind of leg counts.
     """
-    force = _least(divide(x.actuator.peak_torque, abs(x.joint.lift)) for x in loads(design))
+    force = least(divide(x.actuator.peak_torque, abs(x.joint.lift)) for x in loads(design))
     return force / (GRAVITY * design.mass)
 
 
@@ -210,7 +220,7 @@ def foot_speed(design: Design) -> Value:
     The signs of the joint speeds are such that they add up. The slowest kind of leg counts.
     """
     found = loads(design)
-    return _least(
+    return least(
         g.total(abs(x.joint.sweep) * x.actuator.no_load_speed for x in found if x.leg is leg)
         for leg in {id(x.leg): x.leg for x in found}.values()
     )
@@ -240,6 +250,7 @@ def heat(load: LegLoad) -> Value:
     return load.leg.copies * load.torque * load.torque * load.actuator.copper_loss
 
 
-def _least(values: Iterable[Value]) -> Value:
+def least(values: Iterable[Value]) -> Value:
+    """Smallest of some values; NaN of none."""
     found = list(values)
     return minimum(*found) if found else math.nan

@@ -15,7 +15,7 @@ import viser
 from draft.errors import DraftError
 from draft.explore.comparison import compare
 from draft.explore.comparison_tables import LIMITED, Section, TextTable, section
-from draft.metrics.registry import USUAL, of_base
+from draft.metrics.registry import USUAL, of_spec
 from draft.model import Model
 from draft.studio.cards import card
 from draft.studio.session import Session
@@ -83,7 +83,7 @@ def comparison_card(pinned: Model, shown: Model) -> str:
     if designs[0] is designs[1]:
         return card('<div class="mute" id="ds-same">Change the design to compare it.</div>')
     try:
-        of = tuple(of_base(designs[0].floating, (*USUAL, *LIMITED)))
+        of = tuple(of_spec(designs[0].spec, (*USUAL, *LIMITED)))
         found = section(compare(designs, of, names=TITLES))
     except DraftError as error:
         return card(f'<div class="mute">{escape(str(error))}</div>')

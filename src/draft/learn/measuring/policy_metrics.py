@@ -86,7 +86,7 @@ def of_policy(
         if metric.needs != "policy":
             cause = f"'{metric.name}' needs no policy"
             raise DraftError(cause, "use draft.metrics.of_model")
-        if (problem := misfit(metric.name, design.floating)) is not None:
+        if (problem := misfit(metric.name, design.spec)) is not None:
             raise DraftError(problem)
     source = source_for(policy, design)
     if known and source.digest != known:
