@@ -133,3 +133,58 @@ def pendulum(home: float = 0.0, **base: Any) -> draft.Spec:
             "tree.yaml": {"tree": {"name": "base", "type": "fixed", "children": children, **base}},
         }
     )
+
+
+ARM_AND_HAND = {
+    "parameters.yaml": ARM_PARAMETERS.replace("tester_arm", "tester_arm_and_hand")
+    + "  servo: {peak_torque: 1.0, no_load_speed: 8, gear_ratio: 200, mass: 0.05}\n",
+    "tree.yaml": ARM_TREE
+    + """\
+      children:
+        - {chain: finger, prefix: left_, at: [0.06, 0, 0.12], rpy: [0, -pi / 2, 0]}
+        - {chain: finger, prefix: right_, at: [-0.06, 0, 0.12], rpy: [0, -pi / 2, pi]}
+"""
+    + FINGER,
+}
+
+
+def arm_and_hand() -> draft.Spec:
+    """The arm, with two fingers on its tool."""
+    return draft.Spec.parse(ARM_AND_HAND)
+
+
+def planar(joints: int = 2, low: float = -3.0, high: float = 3.0) -> draft.Spec:
+    """Links on parallel level axes, in a row along x at zero; nearly weightless but for `mass`.
+
+    Parameters: `length_K`, `home_K` and `mass_K` of each link.
+    """
+    numbers = {}
+    chain: list[dict[str, Any]] = [{"name": "housing", "motor": {"actuator": "drive", "axis": "y"}}]
+    for k in range(joints):
+        numbers |= {f"length_{k}": 0.3, f"home_{k}": 0.4, f"mass_{k}": 1.0}
+        joint = {"name": f"joint_{k}", "axis": "y", "range": [low, high], "home": f"home_{k}"}
+        chain.append(
+            {
+                "name": f"link_{k}",
+                "joint": joint | {"actuator": "drive"},
+                "link": {"axis": "x", "length": f"length_{k}", "mass": f"mass_{k}"},
+            }
+        )
+        if k < joints - 1:
+            chain[-1]["motor"] = {"actuator": "drive", "axis": "y"}
+    drive = {"peak_torque": 60, "no_load_speed": 8, "gear_ratio": 50, "mass": 1e-6}
+    tree = {"name": "base", "type": "fixed", "at": [0, 0, 2], "children": [{"chain": "limb"}]}
+    return draft.Spec.parse(
+        {
+            "parameters.yaml": {
+                "name": "planar",
+                "population": "humanoid",
+                "parameters": {
+                    name: {"value": value, "unit": "1", "range": [-3, 20], "doc": "A number."}
+                    for name, value in numbers.items()
+                },
+                "actuators": {"drive": drive},
+            },
+            "tree.yaml": {"chains": {"limb": chain}, "tree": tree},
+        }
+    )

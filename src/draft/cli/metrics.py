@@ -129,7 +129,7 @@ def _print(
         shown = _shown(value) if metric.unit != "bool" else ("yes" if value else "no")
         if name == "accepted" and value and not design.judged:
             shown = "not judged"
-        if name == "hold_time" and math.isinf(value):
+        if metric.unit == "s" and math.isinf(value):
             shown = "no limit"
         table.add_row(Text(name, style="bold"), shown, unit, metric.doc)
     out.print("", table, "")

@@ -1,8 +1,8 @@
 """Impact metrics of a foot or a tip, from the joint-space inertia M(q) of models.
 
-A robot on feet is in the crouch and floats, an arm or a hand is at home. Joints are free, rotor inertia is included (MuJoCo's armature), and no force
-but that of the impact acts. The apparent mass of a foot along a direction n is
-1 / (n J M^-1 J' n) (Khatib 1987).
+A robot on feet is in the crouch and floats, an arm or a hand is at home. Joints are free, rotor
+inertia is included (MuJoCo's armature), and no force but that of the impact acts. The apparent mass
+along a direction n is 1 / (n J M^-1 J' n) (Khatib 1987).
 
 For a batch of models MuJoCo computes M(q) one after another (10 microseconds each); the linear
 algebra is done for all at once.

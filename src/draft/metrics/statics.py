@@ -111,7 +111,7 @@ def payload_limits(share: float) -> Callable[[Design], Iterator[Limit]]:
 def payload_rated(design: Design) -> Value:
     """Mass on the trunk, or at the tip of an arm at its reach, at a first rated torque [kg].
 
-    Below zero the robot cannot hold its own weight at rated torque in the crouch, and is too heavy
+    Below zero the robot cannot hold its own weight at rated torque in that pose, and is too heavy
     by that mass; `overload` tells the joint. In the home pose, mostly straighter, it may
     (`standing_torque_rated`). A rating holds for an actuator that turns; at stall it is about 0.7
     of that (docs/limits.md).
@@ -142,7 +142,7 @@ class Overload(NamedTuple):
 
     Attributes:
         joint: its name.
-        torque: torque that holds the robot in the crouch [N m].
+        torque: torque that holds the robot in the crouch, or the arm at its reach [N m].
         rated: rated torque of its actuator [N m].
     """
 
@@ -152,14 +152,16 @@ class Overload(NamedTuple):
 
 
 def overload(design: Design) -> Overload | None:
-    """Joint that exceeds its rated torque most in the crouch, of one design; None if none does.
+    """Joint that exceeds its rated torque most, of one design; None if none does.
+
+    In the crouch, or with an arm at its reach.
 
     >>> draft.metrics.overload(draft.load("humanoid").resolve()).joint
     'left_knee'
     """
     found = [
         Overload(x.joint.names[0], abs(scalar(x.torque)), scalar(x.actuator.rated_torque))
-        for x in loads(design)
+        for x in carrying(design)
     ]
     worst = max(found, key=lambda one: one.torque / one.rated, default=None)
     return worst if worst is not None and worst.torque > worst.rated else None
@@ -172,7 +174,7 @@ def carrying(design: Design) -> tuple[Load, ...]:
 
 
 def payload_at(design: Design, share: Value) -> Value:
-    """Mass on the trunk, or at the tip of an arm, at which the first joint reaches a share of its rated torque [kg].
+    """Mass at which the first joint reaches a share of its rated torque [kg]; see `carrying`.
 
     Args:
         design: one design, or N.

@@ -87,7 +87,7 @@ def stretched(design: Design) -> Stretch | None:
     arm = limbs(design).arm
     if arm is None:
         return None
-    search = _Search(chain(design, arm))
+    search = Search(chain(design, arm))
     search.run()
     angles = dict(zip(arm.joints, search.angles, strict=True))
     found = columns(design, arm, frames_at(design, angles))
@@ -101,7 +101,7 @@ def _load(column: Column, angle: Value) -> Load:
     return Load(joint, actuator, GRAVITY * hang, GRAVITY * lift)
 
 
-class _Search:
+class Search:
     """Search for the pose, from the middle of the ranges.
 
     The shoulder is the point on the axis of the first joint that is nearest to the origin of the

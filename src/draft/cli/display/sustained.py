@@ -80,14 +80,15 @@ def print_limits(design: Design) -> None:
 
 
 def own_weight(design: Design) -> str:
-    """Sentence on a robot too heavy for its own rated torque in the crouch; "" for others."""
+    """Sentence on a robot too heavy for its own rated torque; "" for others."""
     found = overload(design)
     if found is None:
         return ""
     mass = -scalar(of_design(design, ["payload_rated"])["payload_rated"])
+    pose = "in the crouch" if design.floating else "at its reach"
     weight = "its own weight" + (" and its payload" if scalar(design.payload_mass) > 0 else "")
     return (
-        f"payload_rated is below zero: the robot cannot hold {weight} at rated torque in the "
-        f"crouch. It is {brief(mass)} kg too heavy: {found.joint} needs {brief(found.torque)} of "
+        f"payload_rated is below zero: the robot cannot hold {weight} at rated torque {pose}. "
+        f"It is {brief(mass)} kg too heavy: {found.joint} needs {brief(found.torque)} of "
         f"{brief(found.rated)} N m."
     )
