@@ -106,6 +106,8 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "arm": _robots("arm_dog"),
     "biped": _robots("biped"),
     "hexapod": _robots("hexapod"),
+    "fixed-arm": _robots("arm"),
+    "hand": _robots("hand"),
     "payload": _robots("courier"),
     "motors": _motors,
     "import": _robots("go2", "go2:long"),

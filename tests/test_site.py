@@ -33,6 +33,8 @@ NEEDS = {
     "howto/biped": (),
     "howto/explore": ("explore", "figures", "report"),
     "howto/extend": (),
+    "howto/fixed-arm": ("explore",),
+    "howto/hand": ("explore",),
     "howto/hexapod": (),
     "howto/import": ("report",),
     "howto/levers": ("figures",),
@@ -91,11 +93,16 @@ def test_every_page_of_tasks_is_tested_and_has_its_picture() -> None:
         assert 2_000 < picture.stat().st_size < 150_000
 
 
-@pytest.mark.parametrize("robot", ["hexapod", "biped"])
-def test_a_robot_that_a_page_builds_is_the_one_that_ships(robot: str) -> None:
-    page = (DOCS / "howto" / f"{robot}.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize(
+    ("robot", "name"),
+    [("hexapod", "hexapod"), ("biped", "biped"), ("arm", "fixed-arm"), ("hand", "hand")],
+)
+def test_a_robot_that_a_page_builds_is_the_one_that_ships(robot: str, name: str) -> None:
+    page = (DOCS / "howto" / f"{name}.md").read_text(encoding="utf-8")
     files = re.findall(rf"```yaml\n# {robot}/(\S+)\n(.*?)```", page, re.DOTALL)
-    assert {name for name, _ in files} == {"parameters.yaml", "tree.yaml", "root.yaml"}
+    assert {name for name, _ in files} == {
+        one.name for one in (ROOT / "src/draft/robots" / robot).iterdir()
+    }
     for name, text in files:
         shipped = (ROOT / "src/draft/robots" / robot / name).read_text(encoding="utf-8")
         schema, own = shipped.split("\n", 1)
