@@ -22,6 +22,7 @@ from draft.design.loads import Load
 from draft.geometry import Frame, Rotation, Vector
 from draft.values import Mask, Value, atan2, both, cos, either, hypot, maximum, sin, some, where
 
+START = 0.2  # of the ranges: in the middle arms stand upright, where no direction is best
 SWEEPS = 40  # at most, outwards and back; two for most arms
 _STILL = 1e-12  # of the length of the arm: a sweep that gains less is the last
 _TINY = 1e-9  # of the length of the arm: what moves the tip by less is rounding error
@@ -102,7 +103,7 @@ def _load(column: Column, angle: Value) -> Load:
 
 
 class Search:
-    """Search for the pose, from the middle of the ranges.
+    """Search for the pose, from a pose within the ranges.
 
     The shoulder is the point on the axis of the first joint that is nearest to the origin of the
     second, or to the tip of an arm of one joint.
@@ -110,7 +111,7 @@ class Search:
 
     def __init__(self, of: Chain) -> None:
         self.of, self.n = of.segments, len(of.segments)
-        self.angles: list[Value] = [0.5 * (one.low + one.high) for one in self.of]
+        self.angles: list[Value] = [x.low + START * (x.high - x.low) for x in self.of]
         # Tip in the frame of each joint, and that frame in the world, before the joint turns.
         self.tips: list[Vector] = [of.tip] * self.n
         self.frames: list[Frame] = [g.ORIGIN] * self.n
