@@ -26,12 +26,19 @@ from draft.explore.engines import Engine, LocalEngine, RayEngine
 from draft.explore.job import Job, make
 from draft.explore.settings import Sampled
 from draft.explore.sweep import chunk, run_sweep
+from tests.fixed import ARM
 
 VARY = (
     "thigh_length=0.2:0.7",
     "shank_length=0.2:0.7",
     "trunk_length=0.3:1.0",
     "actuators.leg.peak_torque=40:500:log",
+)
+VARY_ARM = (
+    "upper_arm_length=0.2:0.8",
+    "forearm_length=0.2:0.8",
+    "actuators.large.peak_torque=50:300:log",
+    "actuators.small.peak_torque=10:80:log",
 )
 BUILT = ("thigh_length=0.2:0.3", "shank_length=0.2:0.3", "trunk_length=0.4:0.6")
 FAMILY = ("thigh_length=0.2:0.3", "shank_length=0.2:0.3", "trunk_length=0.4:0.6")
@@ -48,6 +55,7 @@ def main() -> None:
             *compiles(),
             *families(),
             *screens(Path(folder)),
+            *arms(Path(folder)),
             *sweeps(Path(folder)),
             *searches(Path(folder)),
         ]
@@ -63,6 +71,22 @@ def screens(folder: Path) -> list[dict[str, Any]]:
         measured(f"screen of {SCREENED:,}, start to file", seconds, "s", 5.0),
         measured("screen, designs/s", SCREENED / seconds, "", SCREENED / 5, at_least=True),
         measured("screen, memory of all processes at the peak", memory / 1e6, "MB", 2000),
+    ]
+
+
+def arms(folder: Path) -> list[dict[str, Any]]:
+    """A million arms of six joints by reach and payload, from the command line."""
+    robot = folder / "arm"
+    robot.mkdir()
+    for name, text in ARM.items():
+        (robot / name).write_text(text, encoding="utf-8")
+    where = ["--where", "reach > 0.8 and payload_peak > 5"]
+    metrics = ["--metrics", "reach", "payload_peak", "payload_rated"]
+    arguments = ["screen", str(robot), "--vary", *VARY_ARM, "--n", str(SCREENED), *where, *metrics]
+    seconds, memory = watched([*arguments, "--out", str(folder / "arms.parquet")])
+    return [
+        measured(f"screen of {SCREENED:,} arms by reach and payload", seconds, "s", 8.0),
+        measured("the same, memory of all processes at the peak", memory / 1e6, "MB", 2000),
     ]
 
 

@@ -10,7 +10,13 @@ from draft.metrics import METRICS
 from tests import fixed
 from tests.commands import Command
 
-OWN = ("mass", "mass_low", "mass_high", "structure_mass", "actuator_share", "accepted")
+OWN = (
+    *("mass", "mass_low", "mass_high", "structure_mass", "actuator_share"),
+    *("reach", "payload_rated", "payload_peak", "payload_hour", "hold_time", "payload_peak_time"),
+    *("tip_force", "tip_speed", "manipulability", "workspace_volume", "accepted"),
+    "reflected_mass",
+)
+CLOSED = {*OWN} - {"accepted", "workspace_volume", "reflected_mass"}
 
 
 @pytest.fixture(autouse=True)
@@ -53,7 +59,14 @@ def test_metrics_of_legs_are_absent_and_not_without_a_value(command: Command) ->
     bases = {one["name"]: one["base"] for one in command.json("metrics")}
     assert bases["mass"] == "any"
     assert bases["learned.top_speed"] == "floating"
-    assert {name for name in METRICS if bases[name] == "any"} >= {*OWN}
+    assert bases["tip_force"] == "arm or hand"
+    assert {name for name in METRICS if bases[name] in ("any", "arm", "floating or arm")} >= {
+        name for name in OWN if bases[name] != "arm or hand"
+    }
+    hand = command.json("metrics hand")["metrics"]
+    assert {"pinch_force", "opposability", "fingertip_force", "grasp_largest"} <= {*hand}
+    assert not {"reach", "payload_peak", "workspace_volume"} & {*hand}
+    assert None not in [x for name, x in hand.items() if name != "hold_time"]
 
 
 @pytest.mark.parametrize("name", ["arm", "hand"])
@@ -83,13 +96,19 @@ def test_searches_over_its_parameters_take_its_metrics(command: Command) -> None
     vary = "--vary pedestal_mass=0:40 actuators.large.peak_torque=30:200"
     screen = command.json(f"screen arm {vary} --n 64 --where 'accepted and mass < 18' --out s")
     assert 0 < screen["rows"] < 64
+    where = "--where 'reach > 0.9 and payload_peak > 5'"
+    few = command.json(f"screen arm {vary} forearm_length=0.2:0.6 --n 64 {where} --out u")
+    assert 0 < few["rows"] < 64
+    vary_hand = "--vary actuators.servo.peak_torque=1:3"
+    few = command.json(f"screen hand {vary_hand} --n 16 --where 'pinch_force > 37' --out v")
+    assert 0 < few["rows"] < 16
     assert command.json(f"sweep arm {vary} --n 4 --out t")["designs"] == 4
-    command(f"optimise arm {vary} --minimise mass --maximise large.peak_torque --trials 8 --out o")
+    command(f"optimise arm {vary} --minimise mass --maximise payload_peak --trials 8 --out o")
     assert "'top_speed' is of robots on a floating base" in command.refuses(
         f"optimise arm {vary} --maximise top_speed --out p"
     )
     table = command.json("sensitivity arm")
-    assert {one for one in OWN if one != "accepted"} <= {*table["metrics"]}
+    assert {*table["metrics"]} >= CLOSED
 
 
 def test_it_is_compared_with_a_robot_on_legs_by_what_both_have(command: Command) -> None:

@@ -141,7 +141,7 @@ def test_a_body_of_the_payload_at_the_tip_takes_the_limiting_torque(name: str) -
     text = mujoco.MjSpec.from_string(design.build().xml)
     site = text.site("grasp")
     load = text.body("tool").add_body(
-        pos=site.pos.copy(), ipos=[0, 0, 0], mass=mass, inertia=[1e-9] * 3
+        pos=list(site.pos), ipos=[0, 0, 0], mass=mass, inertia=[1e-9] * 3
     )
     load.explicitinertial = True
     model = text.compile()

@@ -71,10 +71,8 @@ def grasps(design: Design) -> Grasp:
         names = [joint.actuator for joint in joints if joint is not None and joint.actuator]
         torques = tuple(design.actuators[name].peak_torque for name in names)
         fingers.append(_Finger(chain(design, limb), limb.radius, torques))
-    found = np.array(of_each(design, tuple(fingers), _grasps))
-    if design.count is None:
-        return Grasp(*map(float, found))
-    return Grasp(*found.T)
+    found = of_each(design, tuple(fingers), _grasps)
+    return Grasp(*(found.T if isinstance(found, np.ndarray) else found))
 
 
 @metric(
@@ -86,7 +84,10 @@ def grasps(design: Design) -> Grasp:
     sampled=True,
 )
 def grasp_smallest(design: Design) -> Value:
-    """Smallest object that two opposed fingertips hold between them [m]; 0 also if none oppose."""
+    """Diameter of the smallest object that two opposed fingertips hold between them [m].
+
+    0 if they touch, or if no two tips oppose each other.
+    """
     return grasps(design).smallest
 
 

@@ -123,7 +123,8 @@ def reflected_mass(model: Model | ModelBatch) -> Value:
         inertia, rows = found.inertia[:, dofs][:, :, dofs], found.jacobians[:, i][:, :, dofs]
         mobility = rows @ np.linalg.solve(inertia, rows.swapaxes(1, 2))
         # Ascending eigenvalues; those of directions in which it cannot move come first.
-        masses.append(1.0 / np.linalg.eigvalsh(mobility)[:, 3 - directions(columns)])
+        least = np.linalg.eigvalsh(mobility)[:, 3 - directions(columns)]
+        masses.append(np.asarray(1.0 / least, np.float64))
     return _extreme(np.maximum, masses, model)
 
 

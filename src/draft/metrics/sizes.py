@@ -114,7 +114,7 @@ def leg_length(design: Design) -> Value:
     base="floating or arm",
 )
 def reach(design: Design) -> Value:
-    """Largest height of a hip above the floor; of an arm, of its tip from its shoulder, level [m].
+    """Largest height of a hip over the floor; of an arm, level distance from shoulder to tip [m].
 
     The longest kind of leg counts. The knee is as straight as its range allows and the foot is
     level; its radius or height is included.

@@ -7,6 +7,7 @@ held. Tips and joints are those of `draft.design.limbs`.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations
 
 from draft import geometry as g
 from draft.design import Design
@@ -118,20 +119,17 @@ def manipulability(design: Design) -> Value:
 
 def _manipulability(columns: tuple[Column, ...]) -> Value:
     rank = directions(columns)
-    rows = [[x.arm[i] for x in columns] for i in range(3)]
-    xx, yy, zz, xy, yz, zx = (
-        g.total(a * b for a, b in zip(rows[i], rows[k], strict=True))
-        for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-    )
-    # The product of the r largest eigenvalues, where the others are zero.
+    arms = [x.arm for x in columns]
+    # Cauchy and Binet: det J J' is the sum of the squares of the minors of J, without cancellation.
     if rank == 1:
-        product = xx + yy + zz
+        product = g.total(g.dot(a, a) for a in arms)
     elif rank == 2:
-        product = xx * yy + yy * zz + zz * xx - xy * xy - yz * yz - zx * zx
+        normals = (g.cross(a, b) for a, b in combinations(arms, 2))
+        product = g.total(g.dot(normal, normal) for normal in normals)
     else:
-        minors = xx * (yy * zz - yz * yz), xy * (xy * zz - yz * zx), zx * (xy * yz - yy * zx)
-        product = minors[0] - minors[1] + minors[2]
-    return power(maximum(product, 0.0), 0.5 / rank)
+        minors = (g.dot(a, g.cross(b, c)) for a, b, c in combinations(arms, 3))
+        product = g.total(minor * minor for minor in minors)
+    return power(product, 0.5 / rank)
 
 
 def _finger_force(columns: tuple[Column, ...]) -> Value:

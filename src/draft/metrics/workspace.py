@@ -19,6 +19,7 @@ from draft.values import Array, Value
 POSES = 1 << 15
 CELLS = 32  # along the longest side of the half-plane that the tip crosses
 T = TypeVar("T")
+R = TypeVar("R")
 
 
 @metric(
@@ -45,13 +46,16 @@ def workspace_volume(design: Design) -> Value:
     return of_each(design, chain(design, arm), _volume)
 
 
-def of_each(design: Design, numbers: T, work: Callable[[T], float]) -> Value:
-    """Value of a function of the numbers of each design, one after the other.
+def of_each(design: Design, numbers: T, work: Callable[[T], R]) -> R | Array:
+    """Result of a function of the numbers of each design, one after the other.
 
     Args:
         design: one design, or N.
         numbers: tuples, also nested, of floats and arrays of shape (N,).
         work: function of such tuples without arrays.
+
+    Returns:
+        What it gives, or of N designs an array of shape (N, ...).
     """
     if design.count is None:
         return work(numbers)
