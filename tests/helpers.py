@@ -50,7 +50,7 @@ WHEELED: list[dict[str, Any]] = [
     {
         "name": "rim",
         "type": "wheel",
-        "at": [0, 0.06, 0],
+        "at": [0, 0.06, -0.25],
         "joint": {"name": "roll", "axis": "y", "actuator": "wheel"},
         "wheel": {"radius": 0.09, "width": 0.04, "axis": "y", "mass": 0.6, "site": "foot"},
     },
