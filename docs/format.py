@@ -16,7 +16,7 @@ from draft.laws.quantities import QUANTITIES
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
 from draft.spec.field_types import Model
-from draft.spec.primitives import LINKS, basic, fixed, root
+from draft.spec.primitives import LINKS, basic, fixed, root, wheel
 from draft.spec.primitives.basic import LinkBase
 
 FILE = Path(__file__).parent / "format.md"
@@ -60,6 +60,16 @@ states it is what the trends give without such values of the class.
   the left. `joints` changes the range, the home position or the direction of motion of a joint of
   one copy.
 - A joint of `type: slide` moves its link along its axis, in metres. It has no actuator.
+- The joint of a link of `type: wheel` turns without end: it has no `type`, no `range` and no
+  `home`. With an actuator it is driven: a servo holds its speed, where those of other joints hold
+  their angles. Without one it rolls freely, as a caster.
+
+      - {{name: axle, motor: {{actuator: drive, axis: y}}}}
+      - name: wheel
+        type: wheel
+        joint: {{name: roll, axis: y, actuator: drive}}
+        wheel: {{radius: 0.08, width: 0.04, axis: y, mass: 0.5, site: foot}}
+
 - The root of the tree is a trunk, `type: root`, which floats and whose solid is in root.yaml; or a
   base that is bolted to the world, `type: fixed`, as of an arm or a hand. A fixed base is at `at`
   in the world, turned by `rpy`, and may have a `pedestal` that stands on its origin. Its robot has
@@ -117,6 +127,7 @@ SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
             schema.ChainUse,
             schema.JointChange,
             basic.Joint,
+            wheel.WheelJoint,
             basic.Member,
             basic.Motor,
             basic.Pulley,

@@ -38,6 +38,26 @@ LEG: list[dict[str, Any]] = [
 ]
 
 
+# The leg with a driven wheel in place of its foot.
+WHEELED: list[dict[str, Any]] = [
+    *LEG[:2],
+    {
+        "name": "shank",
+        "joint": {"name": "knee", "axis": "y", "range": [-2, 2], "actuator": "leg"},
+        "link": {"axis": "-z", "length": 0.25, "segment": "shank"},
+        "motor": {"actuator": "wheel", "axis": "y"},
+    },
+    {
+        "name": "rim",
+        "type": "wheel",
+        "at": [0, 0.06, -0.25],
+        "joint": {"name": "roll", "axis": "y", "actuator": "wheel"},
+        "wheel": {"radius": 0.09, "width": 0.04, "axis": "y", "mass": 0.6, "site": "foot"},
+    },
+]
+WHEEL_DRIVE = {"peak_torque": 12, "no_load_speed": 40, "gear_ratio": 6}
+
+
 def leg(**changes: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The leg, with some keys of some of its links changed; None takes a key away."""
     links = copy.deepcopy(LEG)
@@ -79,6 +99,19 @@ def robot(
     # Through JSON, so that a list used twice is written twice and not as an alias.
     plain = json.loads(json.dumps(files))
     return draft.Spec.parse({name: yaml.safe_dump(x, sort_keys=False) for name, x in plain.items()})
+
+
+def wheeled(wheel: Mapping[str, Any] | None = None, **more: Any) -> draft.Spec:
+    """A quadruped on driven wheels; some keys of its wheel link may be changed, as by `leg`."""
+    links = copy.deepcopy(WHEELED)
+    links[-1] |= wheel or {}
+    places = [
+        {"chain": "leg", "at": [x, y, -0.05], "prefix": f"{end}{side}_", **mirror}
+        for end, x in (("F", 0.25), ("R", -0.25))
+        for side, y, mirror in (("L", 0.12, {}), ("R", 0.12, {"mirror": "y"}))
+    ]
+    actuators = {"leg": DRIVE, "wheel": WHEEL_DRIVE}
+    return robot(links, **{"children": places, "actuators": actuators} | more)
 
 
 def parameter(value: float | str, low: float = -1e6, high: float = 1e6) -> dict[str, Any]:

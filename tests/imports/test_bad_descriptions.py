@@ -29,9 +29,9 @@ def having(old: str, new: str) -> str:
 
 
 def rod(limit: str, reach: str = 'lower="-1" upper="1"') -> str:
-    """The sound quadruped with a joint of these limits on line 35."""
-    limit = f"{limit} {reach}"
-    return quadruped(link("rod") + joint("turn", "body", "rod", (0, 0, 0.1), limit=limit))
+    """The sound quadruped with a joint of these limits, which is no wheel's, on line 35."""
+    turn = joint("turn", "body", "rod", (0, 0, 0.1), axis="0 0 1", limit=f"{limit} {reach}")
+    return quadruped(link("rod") + turn)
 
 
 def boxed(size: str) -> str:

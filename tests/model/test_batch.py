@@ -74,10 +74,7 @@ def mixed() -> draft.Spec:
     wheel = {
         "name": "wheel",
         "type": "wheel",
-        "joint": {
-            **{"name": "turn", "type": "continuous", "axis": "y"},
-            "range": [-3, 3],
-        },
+        "joint": {"name": "turn", "axis": "y"},
         "wheel": {
             **{"radius": "tyre", "width": 0.04, "axis": "y"},
             **{"mass": "payload / 2", "site": "foot"},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import pkgutil
 from importlib import import_module
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -38,7 +39,9 @@ signs = st.tuples(*[st.sampled_from([-1.0, 1.0])] * 3)
 
 
 def _end(kind: str) -> tuple[draft.Design, End]:
-    shank = {"sphere": None, **ENDS[kind]}
+    shank: dict[str, Any] = {"sphere": None, **ENDS[kind]}
+    if kind == "wheel":
+        shank["joint"] = {"name": "roll", "axis": "y", "actuator": "leg"}
     design = robot(leg(shank=shank)).resolve()
     end = design.bodies[-1].link.end
     assert end is not None

@@ -80,11 +80,12 @@ def _label(design: Design, index: int, mass: object) -> Text:
     body = design.bodies[index]
     text = Text.assemble((body.name, "bold"), f"  {mass:.3f} kg")
     if body.joint is not None:
-        low, high = body.joint.range
         axis = " ".join(f"{x:g}" for x in body.joint_axis)
         unit = {"prismatic": "m, slides", "continuous": "rad, without end"}
-        unit = unit.get(body.joint.kind, "rad")
-        text.append(f"  {body.joint.name} ({axis}) {low:g}..{high:g} {unit}", style="cyan")
+        low, high = body.joint.range
+        span = f"{low:g}..{high:g} {unit.get(body.joint.kind, 'rad')}"
+        span = "rolls" if body.joint.rolls else span
+        text.append(f"  {body.joint.name} ({axis}) {span}", style="cyan")
     if body.actuator is not None:
         text.append(f"  [{body.actuator.name}]", style="magenta")
     return text

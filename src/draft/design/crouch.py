@@ -168,5 +168,5 @@ def carried(design: Design, head: int) -> list[int]:
 
 
 def is_hinge(body: Body) -> bool:
-    """Return whether a body has a hinge."""
-    return body.joint is not None and not body.joint.slide
+    """Return whether a body has a hinge other than that of a wheel, which poses no leg."""
+    return body.joint is not None and not body.joint.slide and not body.joint.rolls

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,12 +13,20 @@ from draft.spec import links, tree
 from draft.spec.evaluate import Evaluator
 from draft.spec.primitives.base import End
 from draft.spec.primitives.basic import MemberPart, MotorPart, PulleyPart
+from draft.spec.primitives.wheel import WheelPart
 from draft.spec.tree import UNMIRRORED, Signs
 from draft.values import Value, is_array
 
+TURN = (-math.pi, math.pi)  # Angles of a wheel that sliders and poses have [rad].
+_ALONG = 1e-6
+
 
 class Joint(NamedTuple):
-    """A hinge or a slide: unit axis in the frame of the link; range and home [rad or m]."""
+    """A hinge or a slide: unit axis in the frame of the link; range and home [rad or m].
+
+    One that rolls turns a wheel: it is continuous, its range is one turn, and if it is driven, then
+    by a servo of its speed.
+    """
 
     name: str
     slide: bool
@@ -26,6 +35,7 @@ class Joint(NamedTuple):
     home: Value
     actuator: str | None
     continuous: bool = False
+    rolls: bool = False
 
     @property
     def kind(self) -> str:
@@ -63,7 +73,8 @@ def read_link(link: links.Link, r: Evaluator) -> Link:
     """Evaluate a link.
 
     Raises:
-        ResolveError: a length is not positive, a joint range is empty, or an axis is zero.
+        ResolveError: a length is not positive, a joint range is empty, an axis is zero, or a wheel
+            does not turn about its own axis.
     """
     name = link.name
     member = motor = pulley = end = None
@@ -78,6 +89,11 @@ def read_link(link: links.Link, r: Evaluator) -> Link:
     joint = _joint(link.joint, r) if link.joint is not None else None
     if link.end_type is not None and link.end is not None:
         end = link.end_type.read(link.end, name, r)
+        if joint is not None and joint.rolls and isinstance(end, WheelPart):
+            off = g.norm(g.cross(end.axis, joint.axis))
+            what = f"sine of the angle between the axes of wheel '{name}' and joint '{joint.name}'"
+            rule = "must be 0, as a wheel turns about its own axis"
+            r.require(off < _ALONG, link.end.triple("axis")[0], what, off, rule)
     return Link(name, joint, member, motor, pulley, end, tip)
 
 
@@ -135,6 +151,9 @@ def _mirrored_joint(joint: Joint, signs: Signs) -> Joint:
 
 
 def _joint(joint: links.Joint, r: Evaluator) -> Joint:
+    if joint.range is None:
+        axis = r.axis(joint.axis, joint.name)
+        return Joint(joint.name, False, axis, TURN, 0.0, joint.actuator, True, True)
     low = r.number(joint.range[0], f"range of {joint.name}")
     high = r.number(joint.range[1], f"range of {joint.name}")
     r.require(

@@ -27,6 +27,7 @@ NECK_HINGES = 3
 LEVEL_AXIS = 0.3
 # Roles that no class of the survey has: their members weigh as `other`.
 SPINE, ARM_ROLE, WHEEL, CASTER = "spine", "arm", "wheel", "caster"
+ROLLING = (WHEEL, CASTER)
 # Furthest that the frames and centres of mass of a wheel lie from its axis [m].
 TRUE = 0.02
 

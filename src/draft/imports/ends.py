@@ -134,7 +134,7 @@ def wheel(body: Body, site: str | None, shapes: Shapes, parameters: Parameters) 
     broad = parameters.add("wheel_width", float(size[1]), "Width of the wheel.", 4)
     doc = "Mass of the wheel over its cylinder: that of DEEP Robotics' M20 and M20S."
     dense = parameters.add("wheel_density", WHEEL_DENSITY, doc, 1, "kg/m3")
-    axis = direction(body.axis)
+    axis = direction(body.axis, shapes.reduced.digits + 1)
     disc: Node = {"radius": round_, "width": broad, "axis": axis, "density": dense}
     return {"type": "wheel", "wheel": disc | ({"site": site} if site else {})}
 

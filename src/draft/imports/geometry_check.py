@@ -18,6 +18,7 @@ import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.description.description import Description, Joint
 from draft.description.xmlfile import DescriptionError, Element
 from draft.errors import Problem
+from draft.imports.anatomy import ROLLING
 from draft.imports.reduce import Body, Reduced
 from draft.values import Array
 
@@ -252,7 +253,9 @@ def _differences(
 
 
 def _limit_difference(pair: _Pair, maker: mujoco.MjModel, model: mujoco.MjModel) -> float:
-    """Largest difference of a limit [rad or m]; 0 where the import changed it with a warning."""
+    """Largest difference of a limit [rad or m]; 0 of a wheel, or of one changed with a warning."""
+    if pair.body.role in ROLLING:
+        return 0.0
     if not maker.jnt_limited[pair.theirs] or pair.joint.limits != pair.body.limits:
         return 0.0
     gap = np.abs(maker.jnt_range[pair.theirs] - model.jnt_range[pair.ours])

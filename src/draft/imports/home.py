@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from draft.imports.anatomy import ROLLING
 from draft.imports.formatting import tidy, vector
 from draft.imports.reduce import Body
 from draft.values import scalar
@@ -34,6 +35,9 @@ def home_pose(way: Sequence[Body], mirrored: bool = False) -> list[float]:
         angles[j], angles[i] = sign * CROUCH, -sign * turn * CROUCH / 2
     found: list[float] = []
     for body, angle in zip(way, angles, strict=True):
+        if body.role in ROLLING:
+            found.append(0.0)
+            continue
         low, high = vector(body.limits, 4)
         found.append(tidy(min(max(angle, scalar(low)), scalar(high)), 4))
     return found

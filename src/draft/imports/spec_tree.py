@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from draft.imports import ends, names
-from draft.imports.anatomy import CASTER, run
+from draft.imports.anatomy import ROLLING, WHEEL, run
 from draft.imports.attachments import Attachments, opposite, side_of
 from draft.imports.bends import held_bends
 from draft.imports.ends import Node
@@ -215,7 +215,7 @@ class Writer:
             change: Node = {}
             if copy.reverse[i]:
                 change["reverse"] = True
-            if vector(a.limits, 4) != vector(b.limits, 4):
+            if a.role not in ROLLING and vector(a.limits, 4) != vector(b.limits, 4):
                 change["range"] = vector(b.limits, 4)
             if own[i] != homes[i]:
                 change["home"] = own[i]
@@ -274,12 +274,14 @@ class Writer:
 
     def joint(self, body: Body, name: str, home: float) -> Node:
         """Joint of a link."""
+        axis = direction(body.axis, self.reduced.digits + 1)
+        if body.role in ROLLING:
+            return {"name": name, "axis": axis, "actuator": self.drive(body)}
         joint: Node = {"name": name}
         if body.slides:
             joint["type"] = "slide"
         elif body.joint is not None and body.joint.limits is None:
             joint["type"] = "continuous"
-        axis = direction(body.axis, self.reduced.digits + 1)
         joint |= {"axis": axis, "range": vector(body.limits, 4)}
         if not body.slides:
             joint["actuator"] = self.drive(body)
@@ -385,10 +387,9 @@ class Writer:
             # Where all begin at its own joint there is no member: the limbs' housings weigh.
             found: Node = {"link": self.member(body, middle, name)} if middle.any() else {}
             return found | {"children": self.uses(body)}  # type: ignore[dict-item]
-        if body.role == "wheel":
-            return ends.wheel(body, self.site(), self.shapes, self.parameters)
-        if body.role == CASTER:
-            return ends.wheel(body, None, self.shapes, self.parameters)
+        if body.role in ROLLING:
+            site = self.site() if body.role == WHEEL else None
+            return ends.wheel(body, site, self.shapes, self.parameters)
         if body.role == "ankle" and body.kind in self.known and self.population == "humanoid":
             return ends.plate_foot(body, self.site(), self.shapes, self.parameters)
         if body.role in ("knee", "hip", "ankle") and body.kind in self.known:

@@ -197,8 +197,8 @@ class _Reader:
         joint = self.template.joint(a["name"])
         dof = int(joint.dofadr[0])
         self.put_unit("jnt_axis", joint.id, a["axis"])
-        self.put("jnt_range", joint.id, a["range"])
         for name, of, at in (
+            ("range", "jnt_range", joint.id),
             ("armature", "dof_armature", dof),
             ("damping", "dof_damping", dof),
             ("frictionloss", "dof_frictionloss", dof),

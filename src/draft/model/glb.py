@@ -117,7 +117,9 @@ def _nodes(model: Model) -> list[Node]:
                 motion = {"translation": [x * home for x in axis]}
             else:
                 motion = {"rotation": _xyzw(quaternion(about(body.joint_axis, home)))}
-            extras = {"joint": joint.kind, "axis": axis, "range": [scalar(x) for x in joint.range]}
+            extras = {"joint": joint.kind, "axis": axis}
+            if not joint.rolls:
+                extras["range"] = [scalar(x) for x in joint.range]
             node = {"name": body.prefix + joint.name, **motion, "extras": extras | {"home": home}}
             holder = _append(nodes, holder, node)
         nodes[holder].setdefault("extras", {})["body"] = i

@@ -213,7 +213,7 @@ def _body(body: Body, actuator: Actuator | None) -> Element:
             name=body.prefix + joint.name,
             type="slide" if joint.slide else None,
             axis=body.joint_axis,
-            range=joint.range,
+            range=None if joint.rolls else joint.range,
             limited="false" if joint.continuous else None,
             armature=a.armature if a else None,
             damping=a.damping if a else None,

@@ -2,7 +2,8 @@
 
 Servo gains per peak torque are those of arXiv 2609.38405. A servo deflects under the weight of the
 robot, which makes robots with long legs fall over. The home targets compensate for the deflection:
-target = angle + torque / stiffness.
+target = angle + torque / stiffness. The servo of a driven wheel has the same damping and no
+stiffness: its target is a speed [rad/s], 0 in the home pose.
 """
 
 from __future__ import annotations
@@ -44,6 +45,19 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
             continue
         actuator = design.actuators[joint.actuator]
         peak, speed = scalar(actuator.peak_torque), scalar(actuator.no_load_speed)
+        stall = (scalar(actuator.stall_torque),) if actuator.has_corner else ()
+        custom.add("numeric", name=f"{name}_dc_motor", data=(peak, speed, *stall))
+        if joint.rolls:
+            servos.add(
+                "velocity",
+                name=name,
+                joint=name,
+                kv=DAMPING * peak,
+                ctrlrange=(-speed, speed),
+                forcerange=(-peak, peak),
+            )
+            targets.append(0.0)
+            continue
         stiffness = STIFFNESS * peak
         servos.add(
             "position",
@@ -54,8 +68,6 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
             forcerange=(-peak, peak),
             inheritrange=1,
         )
-        stall = (scalar(actuator.stall_torque),) if actuator.has_corner else ()
-        custom.add("numeric", name=f"{name}_dc_motor", data=(peak, speed, *stall))
         low, high = (scalar(end) for end in joint.range)
         lead = np.clip(torque_of[name], -peak, peak) / stiffness
         targets.append(float(np.clip(scalar(joint.home) + lead, low, high)))

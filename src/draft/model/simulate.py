@@ -289,7 +289,7 @@ def _servos(design: Design, scene: mujoco.MjModel, course: Course) -> Iterator[F
                 None,
                 servo.unit,
             )
-        elif servo.most > servo.limit:
+        elif servo.most > servo.limit and not servo.joint.rolls:  # A wheel holds its speed.
             weak.setdefault((servo.joint.name, servo.actuator.name), []).append(servo)
     for alike in weak.values():
         yield from _weak(alike)

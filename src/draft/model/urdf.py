@@ -65,15 +65,15 @@ def robot_urdf(model: Model) -> str:
 def actuators(design: Design) -> dict[str, Any]:
     """Actuators of the joints as plain data, in SI units at the joint unless a key says otherwise.
 
-    Gains are those of the servos in `scene.xml`: torque = kp (target - angle) - kd speed.
+    Gains are those of the servos in `scene.xml`: torque = kp (target - angle) - kd speed; of a
+    driven wheel, which has no range, torque = kd (target - speed).
     """
     joints: dict[str, object] = {}
     cornered = any(a.has_corner for a in design.actuators.values())
     for name, joint in design.joints.items():
         entry: dict[str, object] = {
             "type": joint.kind,
-            "range": list(joint.range),
-            "home": joint.home,
+            **({} if joint.rolls else {"range": list(joint.range), "home": joint.home}),
             "class": joint.actuator,
         }
         if joint.actuator is not None:
@@ -83,7 +83,7 @@ def actuators(design: Design) -> dict[str, Any]:
                 **{name: getattr(a, name) for name in a.quantities if name not in _OF_MODULE},
                 **({"stall_torque": a.stall_torque} if a.has_corner else {}),
                 "rotor_inertia_motor_side": a.rotor_inertia,
-                "kp": STIFFNESS * a.peak_torque,
+                "kp": 0.0 if joint.rolls else STIFFNESS * a.peak_torque,
                 "kd": DAMPING * a.peak_torque,
             }
         joints[name] = entry

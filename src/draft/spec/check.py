@@ -15,6 +15,7 @@ from draft.spec.primitives.basic import Segment
 from draft.spec.primitives.foot import PlatePart
 from draft.spec.primitives.root import TrunkPart
 from draft.spec.primitives.sphere import SpherePart
+from draft.spec.primitives.wheel import WheelPart
 from draft.spec.problems import first_few
 from draft.spec.schema import STATED, TREND
 from draft.spec.tree import Body
@@ -157,12 +158,15 @@ def _fixed_problems(spec: Spec) -> Iterator[Problem]:
     for link in {id(body.link): body.link for body in spec.bodies}.values():
         end = link.end_type
         named = any(name.split("_")[-1] == _FOOT for name, _ in link.sites)
-        if end is not None and (end is PlatePart or (end is SpherePart and named)):
+        on_ground = end is PlatePart or (end is WheelPart and bool(link.sites))
+        if on_ground or (end is SpherePart and named):
             cause = f"'{link.name}' ends in a foot, and the base '{base}' is fixed"
             remedy = (
                 "give the robot a trunk, 'type: root' and root.yaml, or end the link in "
                 "'type: sphere' with another 'site' or none"
             )
+            if end is WheelPart:
+                remedy = "give the robot a trunk, 'type: root' and root.yaml, or remove 'site'"
             where = link.sites[0][1] if link.sites else link.where
             yield Problem(cause, where, remedy)
 

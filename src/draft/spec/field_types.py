@@ -9,7 +9,8 @@ no key of a file has parentheses.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, get_args
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import (
     BaseModel,
@@ -87,6 +88,8 @@ class Model(BaseModel):
     """Base of all models here: unknown keys are errors, values are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+    # What to do about keys that others like it have, and it has not.
+    absent: ClassVar[Mapping[str, str]] = {}
 
     @model_validator(mode="before")
     @classmethod
@@ -95,5 +98,7 @@ class Model(BaseModel):
         if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
             unknown = [key for key in data if key not in cls.model_fields]
             known = list(cls.model_fields)
-            raise PydanticCustomError("unknown_keys", "", {"unknown": unknown, "known": known})
+            raise PydanticCustomError(
+                "unknown_keys", "", {"unknown": unknown, "known": known, "absent": cls.absent}
+            )
         return data

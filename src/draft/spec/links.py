@@ -13,17 +13,21 @@ from draft.spec.field_types import Model
 from draft.spec.primitives.base import End, Written, compile_part, read_axis
 from draft.spec.primitives.basic import Joint as JointFields
 from draft.spec.primitives.basic import LinkBase, Member, Motor, Pulley
+from draft.spec.primitives.wheel import WheelJoint
 from draft.spec.reader import Path_, Source
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A joint at the origin of a link, as written: a slide or continuous if true, else a hinge."""
+    """A joint at the origin of a link, as written: a slide or continuous if true, else a hinge.
+
+    The joint of a wheel has no range.
+    """
 
     name: str
     slide: bool
     axis: Triple
-    range: tuple[Expression, Expression]
+    range: tuple[Expression, Expression] | None
     actuator: str | None
     home: Expression
     where: Location
@@ -86,9 +90,14 @@ def read_link(node: LinkBase, path: Path_, source: Source) -> Link:
     return Link(node.name, joint, member, motor, pulley, node.end, end, where)
 
 
-def _joint(joint: JointFields, path: Path_, source: Source) -> Joint:
+def _joint(joint: JointFields | WheelJoint, path: Path_, source: Source) -> Joint:
     """Compile a joint; a slide cannot have an actuator class, which is rotary."""
-    slide, driven = joint.type == "slide", source.at((*path, "actuator"))
+    driven, where = source.at((*path, "actuator")), source.at((*path, "name"))
+    axis = read_axis(joint.axis, (*path, "axis"), source)
+    if isinstance(joint, WheelJoint):
+        zero = parse(0.0, where)
+        return Joint(joint.name, False, axis, None, joint.actuator, zero, where, driven, True)
+    slide = joint.type == "slide"
     if slide and joint.actuator is not None:
         cause = (
             f"joint '{joint.name}' is a slide, and '{joint.actuator}' is a rotary actuator class"
@@ -96,9 +105,7 @@ def _joint(joint: JointFields, path: Path_, source: Source) -> Joint:
         remedy = "remove 'actuator', as a slide is passive, or write 'type: hinge'"
         raise SpecError(Problem(cause, driven, remedy))
     low, high = (parse(x, source.at((*path, "range", i))) for i, x in enumerate(joint.range))
-    axis = read_axis(joint.axis, (*path, "axis"), source)
     home = parse(joint.home, source.at((*path, "home")))
-    where = source.at((*path, "name"))
     return Joint(
         joint.name,
         slide,

@@ -17,6 +17,8 @@ MAX_PROBLEMS = 12
 NAME_RULE = "a name has letters, digits and _, no digit first, and at most 64 of them"
 # Types of the root of a tree.
 ROOTS = ("root", "fixed")
+_RANGE = ("joint", "range")
+ONLY_WHEELS = "; only the joint of a link of 'type: wheel' has none"
 _KEY = "[key]"  # pydantic's last step where a mapping's key is wrong, not its value
 _MAPPING = "expected a mapping of keys and values"
 
@@ -47,7 +49,7 @@ def _problems(item: ErrorDetails, source: Source) -> Iterator[Problem]:
     what, context = _dotted(path), item.get("ctx", {})
     if item["type"] == "unknown_keys":
         for key in context["unknown"]:
-            remedy = suggest(key, context["known"], "known here")
+            remedy = context["absent"].get(key) or suggest(key, context["known"], "known here")
             for type_, link in LINKS.items():
                 if link.end is not None and link.end.key == key:
                     remedy = f"only a link of 'type: {type_}' has it; {remedy}"
@@ -56,7 +58,8 @@ def _problems(item: ErrorDetails, source: Source) -> Iterator[Problem]:
         return
     if item["type"] == "missing":
         name = item["loc"][-1]
-        yield Problem(f"'{name}' is missing in {what}", source.at(path), f"add '{name}: ...'")
+        remedy = f"add '{name}: ...'" + (ONLY_WHEELS if (*path[-1:], name) == _RANGE else "")
+        yield Problem(f"'{name}' is missing in {what}", source.at(path), remedy)
         return
     cause, remedy = _cause_and_remedy(item["type"], item["msg"], item["input"], context)
     if item["type"] in ("link_type", "root_type"):

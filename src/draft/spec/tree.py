@@ -17,6 +17,7 @@ from draft.spec.field_types import Model
 from draft.spec.links import Joint, Link, read_link
 from draft.spec.primitives.base import Written, compile_part, read_triple
 from draft.spec.primitives.fixed import FixedBase, PedestalPart
+from draft.spec.primitives.wheel import WheelJoint
 from draft.spec.reader import Path_, Source
 
 Signs = tuple[float, float, float]
@@ -249,10 +250,19 @@ def _joint_names(nodes: Sequence[schema.Node]) -> list[str]:
 
 
 def _changed_joint(joint: Joint | None, changes: _Changes, source: Source) -> Joint | None:
-    """Joint with the range, home position and axis of one use of its chain."""
+    """Joint with the range, home position and axis of one use of its chain.
+
+    Raises:
+        SpecError: the range or home of a wheel's joint is to change, which has none.
+    """
     if joint is None:
         return None
     change, path = changes.table[joint.name], (*changes.path, joint.name)
+    if joint.range is None and (turned := change.model_fields_set - {"reverse"}):
+        key = min(turned)
+        where = source.at((*path, key), key=True)
+        cause = f"joint '{joint.name}' of a wheel has no '{key}' to change"
+        raise SpecError(Problem(cause, where, WheelJoint.absent[key]))
     if change.range is not None:
         low, high = (
             parse(value, source.at((*path, "range", i))) for i, value in enumerate(change.range)

@@ -59,7 +59,8 @@ def link(design: Design, body: int) -> str:
     if one.joint is not None and joint is not None:
         low, high = (scalar(end) for end in joint.range)
         unit = "m" if joint.slide else "rad"
-        rows.append(("joint", f"{one.prefix + one.joint.name}, {low:.2f} to {high:.2f} {unit}"))
+        span = "rolls" if joint.rolls else f"{low:.2f} to {high:.2f} {unit}"
+        rows.append(("joint", f"{one.prefix + one.joint.name}, {span}"))
         places.add(one.prefix + one.joint.name)
     for what, actuator in (
         ("driven by", design.actuators.get(str(joint.actuator)) if joint else None),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
@@ -22,6 +23,28 @@ from draft.spec.primitives.base import (
 )
 from draft.spec.primitives.basic import LinkBase
 from draft.values import Value
+
+_ENDLESS = "a wheel turns without end: remove it"
+
+
+class WheelJoint(Model):
+    """The joint of a wheel, which turns without end.
+
+    With an actuator it is driven by a servo of its speed, not of its angle.
+    """
+
+    absent: ClassVar[Mapping[str, str]] = {
+        "range": _ENDLESS,
+        "type": _ENDLESS,
+        "home": "a wheel is the same at every angle: remove it",
+    }
+
+    name: Name
+    """Name, after the prefix of the chain."""
+    axis: Axis
+    """Axis of positive rotation in the link's frame, along that of the wheel."""
+    actuator: Name | None = None
+    """Actuator class that drives it. Omit it for a passive wheel, such as a caster."""
 
 
 class Wheel(Model):
@@ -87,6 +110,8 @@ class WheelLink(LinkBase):
     """A wheel of stated size and mass, which its joint turns. A member, if any, is structure."""
 
     type: Literal["wheel"]
+    joint: WheelJoint | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
+    """Joint at its origin. Without one the wheel is fixed to its parent."""
     wheel: Wheel
     """The wheel."""
     end: ClassVar = WheelPart
