@@ -19,7 +19,7 @@ BUDGET = {
     "assistant": 620,
     "cli": 5_840,
     "description": 2_240,
-    "design": 6_130,
+    "design": 6_150,
     "explore": 4_730,
     "fitting": 3_890,
     "imports": 6_410,

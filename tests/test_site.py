@@ -94,11 +94,11 @@ def test_every_page_of_tasks_is_tested_and_has_its_picture() -> None:
 
 
 @pytest.mark.parametrize(
-    ("robot", "name"),
+    ("robot", "title"),
     [("hexapod", "hexapod"), ("biped", "biped"), ("arm", "fixed-arm"), ("hand", "hand")],
 )
-def test_a_robot_that_a_page_builds_is_the_one_that_ships(robot: str, name: str) -> None:
-    page = (DOCS / "howto" / f"{name}.md").read_text(encoding="utf-8")
+def test_a_robot_that_a_page_builds_is_the_one_that_ships(robot: str, title: str) -> None:
+    page = (DOCS / "howto" / f"{title}.md").read_text(encoding="utf-8")
     files = re.findall(rf"```yaml\n# {robot}/(\S+)\n(.*?)```", page, re.DOTALL)
     assert {name for name, _ in files} == {
         one.name for one in (ROOT / "src/draft/robots" / robot).iterdir()
