@@ -35,12 +35,12 @@ def read(path: Path, shown: str | None = None) -> Description:
     return from_xml(read_file(path, shown))
 
 
-def from_xml(root: Element, link: str = "") -> Description:
+def from_xml(root: Element, within: str = "") -> Description:
     """Read the root element of a URDF.
 
     Args:
         root: the element.
-        link: a link of the tree that is read, where there are several; "" for one tree.
+        within: a link of the tree that is read, where there are several; "" for one tree.
 
     Raises:
         DescriptionError: not a URDF, or not a tree of links; the message gives the line.
@@ -62,11 +62,10 @@ def from_xml(root: Element, link: str = "") -> Description:
         joints[joint.name] = joint
     file = root.where.file
     joints, loops = _without_loops(joints)
-    if link in links:
-        links = {
-            name: own for name, own in links.items() if _top(name, joints) == _top(link, joints)
-        }
-        joints = {name: own for name, own in joints.items() if own.child in links}
+    if within in links:
+        own = _top(within, joints)
+        links = {name: link for name, link in links.items() if _top(name, joints) == own}
+        joints = {name: joint for name, joint in joints.items() if joint.child in links}
     top = root_of(file, links, joints)
     return Description(
         root.attributes.get("name", ""),

@@ -78,4 +78,5 @@ def pedestal(reduced: Reduced, shapes: Shapes) -> Node:
     solid: Node = {"size": size}
     if mass > 0:
         solid["mass"] = tidy(mass, 3)
-    return found | {"pedestal": solid}
+    found["pedestal"] = solid
+    return found
