@@ -25,7 +25,7 @@ BUDGET = {
     "imports": 6_260,
     "laws": 2_000,
     "learn": 19_920,
-    "metrics": 1_990,
+    "metrics": 2_160,
     "model": 4_010,
     "reporting": 1_820,
     "serving": 550,

@@ -18,7 +18,9 @@ def machine(design: Design) -> str:
     if design.floating:
         legs = count(design)
         if legs:
-            return f"robot on {counted(legs, 'leg')}"
+            return f"robot on {counted(legs, 'leg')}{' with wheels' if design.rolls else ''}"
+        if design.rolls:
+            return "robot on wheels"
         return "robot on feet without knees" if design.feet else "floating robot without legs"
     chains: set[int] = set()
     top: list[int] = [0]  # body on the base that each body is attached to

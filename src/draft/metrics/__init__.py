@@ -48,7 +48,7 @@ _MODULES = {"of_policy": "draft.learn.measuring.policy_metrics"}
 __getattr__ = on_first_use(__name__, _MODULES)
 
 # Modules in the order in which their metrics are shown; others follow by name.
-_ORDER = ("sizes", "statics", "leaping", "speed", "heat", "energy", "verdict", "impact")
+_ORDER = ("sizes", "statics", "leaping", "speed", "heat", "energy", "rolling", "verdict", "impact")
 
 
 def _order(module: str) -> tuple[int, str]:

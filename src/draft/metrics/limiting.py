@@ -64,7 +64,7 @@ def limits(design: Design, names: Sequence[str] = ()) -> dict[str, tuple[Limit, 
     for metric in METRICS.values():
         if metric.limits is None or (names and metric.name not in names):
             continue
-        if not metric.fits(design.floating):
+        if not metric.fits(design.floating, design.rolls):
             continue
         sign = 1.0 if metric.better == "more" else -1.0
         try:

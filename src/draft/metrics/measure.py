@@ -60,7 +60,7 @@ def _chosen(names: Iterable[str] | None, design: Design) -> list[str]:
         DraftError: an unknown metric, or one of robots with another base.
     """
     if names is None:
-        return [*of_base(design.floating)]
+        return [*of_base(design.floating, None, design.rolls)]
     chosen = list(names)
     for name in chosen:
         if (problem := misfit(name, design.floating)) is not None:

@@ -25,7 +25,10 @@ def measure(design: Design) -> dict[str, float]:
     if design.accepted:
         return of_model(design.build())
     closed = of_design(design)
-    return {name: scalar(closed.get(name, math.nan)) for name in of_base(design.floating)}
+    return {
+        name: scalar(closed.get(name, math.nan))
+        for name in of_base(design.floating, None, design.rolls)
+    }
 
 
 def record(design: Design, found: Mapping[str, float]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Better = Literal["less", "more", ""]
 Needs = Literal["design", "model", "policy"]
-Base = Literal["any", "floating", "fixed"]
+Base = Literal["any", "floating", "fixed", "wheels"]
 F = TypeVar("F", bound=Callable[[Any], Any])
 
 
@@ -36,7 +36,8 @@ class Metric:
             a Model to a float.
         batch: whether a function of a Model also takes a ModelBatch and returns an array of shape
             (models,); otherwise models are built one by one.
-        base: base of the robots that have it, such as "floating" of what is about walking.
+        base: base of the robots that have it, such as "floating" of what is about walking;
+            "wheels" of those on driven wheels.
         limits: function from one Design to what limits the metric; None if nothing is named.
     """
 
@@ -52,9 +53,10 @@ class Metric:
     limits: Callable[[Any], Iterable[Limit]] | None = None
     base: Base = "any"
 
-    def fits(self, floating: bool) -> bool:
-        """Whether robots have it whose base floats, or is fixed to the world."""
-        return self.base in ("any", "floating" if floating else "fixed")
+    def fits(self, floating: bool, rolls: bool = False) -> bool:
+        """Whether robots have it whose base floats, or is fixed to the world, or is on wheels."""
+        own = ("any", "floating" if floating else "fixed", *(("wheels",) if rolls else ()))
+        return self.base in own
 
 
 METRICS: Registry[Metric] = Registry("metric")
@@ -97,7 +99,8 @@ def metric(
         needs: "design" for a function of a Design, "model" for one of a Model.
         batch: whether a function of a Model also takes a ModelBatch.
         limits: function from one Design to what limits it (`draft.metrics.limits`).
-        base: base of the robots that have it: "floating" for what is about legs or walking.
+        base: base of the robots that have it: "floating" for what is about legs or walking,
+            "wheels" for what is about driven wheels.
 
     Raises:
         DraftError: a metric of this name exists already.
@@ -115,15 +118,18 @@ def metric(
     return register
 
 
-def of_base(floating: bool, names: Iterable[str] | None = None) -> dict[str, Metric]:
+def of_base(
+    floating: bool, names: Iterable[str] | None = None, rolls: bool = False
+) -> dict[str, Metric]:
     """Metrics of robots whose base floats, or is fixed to the world, by name.
 
     Args:
         floating: whether the base floats.
         names: those to choose from; None for all.
+        rolls: whether it is on driven wheels.
     """
     chosen = METRICS if names is None else names
-    return {name: METRICS[name] for name in chosen if METRICS[name].fits(floating)}
+    return {name: METRICS[name] for name in chosen if METRICS[name].fits(floating, rolls)}
 
 
 def misfit(name: str, floating: bool) -> Problem | None:
@@ -132,7 +138,7 @@ def misfit(name: str, floating: bool) -> Problem | None:
     Raises:
         DraftError: there is no such metric.
     """
-    if find(name).fits(floating):
+    if find(name).fits(floating, rolls=floating):  # Without wheels it is NaN.
         return None
     own, other = ("floats", "fixed") if floating else ("is fixed to the world", "floating")
     known = ", ".join(of_base(floating))
