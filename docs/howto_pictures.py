@@ -106,6 +106,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "arm": _robots("arm_dog"),
     "biped": _robots("biped"),
     "hexapod": _robots("hexapod"),
+    "wheeled": _robots("roller"),
     "payload": _robots("courier"),
     "motors": _motors,
     "import": _robots("go2", "go2:long"),

@@ -70,7 +70,10 @@ def offered(completion: Path, *words: str) -> list[str]:
         (("study", "ro"), ["robot"]),
         (("study", "collect", "--"), ["--out", "--help"]),
         (("study", "mine.yaml", "--dr"), ["--dry-run"]),
-        (("new", "mine", "--like", ""), ["biped", "hexapod", "hopper", "humanoid", "quadruped"]),
+        (
+            ("new", "mine", "--like", ""),
+            ["biped", "hexapod", "hopper", "humanoid", "quadruped", "wheeled"],
+        ),
         (("nothing", "x"), []),
     ],
 )

@@ -69,7 +69,7 @@ def shipped() -> tuple[str, ...]:
     """Names of the robots that Draft and its extensions ship.
 
     >>> draft.shipped()
-    ('biped', 'hexapod', 'hopper', 'humanoid', 'quadruped')
+    ('biped', 'hexapod', 'hopper', 'humanoid', 'quadruped', 'wheeled')
     """
     return tuple(sorted(FOLDERS))
 
