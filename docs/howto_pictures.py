@@ -108,6 +108,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "hexapod": _robots("hexapod"),
     "fixed-arm": _robots("arm"),
     "hand": _robots("hand"),
+    "wheeled": _robots("roller"),
     "payload": _robots("courier"),
     "motors": _motors,
     "import": _robots("go2", "go2:long"),

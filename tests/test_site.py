@@ -43,6 +43,7 @@ NEEDS = {
     "howto/quadruped": ("explore",),
     "howto/ros": (),
     "howto/train": (),
+    "howto/wheeled": (),
     "howto/walk": ("report",),
 }
 # Packages that a page says how to install.

@@ -106,8 +106,8 @@ def test_view_and_studio_take_the_same_forms(
         (
             ("baer",),
             "'baer' names no robot or design\n  did you mean 'bear'? available: arm, bear, "
-            "biped, cheetah, giraffe, hand, hexapod, hopper, humanoid, mine, quadruped, robot; or "
-            "a robot's or a model's folder",
+            "biped, cheetah, giraffe, hand, hexapod, hopper, humanoid, mine, quadruped, robot, "
+            "wheeled; or a robot's or a model's folder",
         ),
         (("baer:x",), "'baer' names no robot or design\n  did you mean 'bear'?"),
         (

@@ -7,14 +7,28 @@ from draft.design.legs import count
 from draft.design.limbs import branches
 from draft.errors import counted
 from draft.spec import Spec
+from draft.spec.primitives.wheel import WheelPart
+from draft.spec.tree import Body
 
 
 def kinds(spec: Spec) -> frozenset[str]:
-    """Kinds of machine of a robot: "floating", or "fixed" with "arm", "hand", both or neither."""
+    """Kinds of machine of a robot.
+
+    "floating", with "wheels" if it stands on driven ones, or "fixed" with "arm", "hand", both or
+    neither.
+    """
     if spec.floating:
-        return frozenset({"floating"})
+        return frozenset({"floating", *(["wheels"] if any(map(_rolls, spec.bodies)) else [])})
     arm, fingers = branches(spec)
     return frozenset({"fixed", *(["arm"] if arm else []), *(["hand"] if fingers else [])})
+
+
+def _rolls(body: Body) -> bool:
+    """Whether a robot stands on the link of a body, and it is a driven wheel."""
+    link, end = body.link, body.link.end
+    wheel = link.end_type is not None and issubclass(link.end_type, WheelPart)
+    driven = link.joint is not None and link.joint.actuator is not None
+    return wheel and driven and end is not None and end.fields.site is not None
 
 
 def machine(design: Design) -> str:
@@ -29,7 +43,9 @@ def machine(design: Design) -> str:
     if design.floating:
         legs = count(design)
         if legs:
-            return f"robot on {counted(legs, 'leg')}"
+            return f"robot on {counted(legs, 'leg')}{' with wheels' if design.rolls else ''}"
+        if design.rolls:
+            return "robot on wheels"
         return "robot on feet without knees" if design.feet else "floating robot without legs"
     arm, fingers = branches(design.spec)
     hand = f"hand of {len(fingers)} fingers"

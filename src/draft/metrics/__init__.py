@@ -49,7 +49,18 @@ __getattr__ = on_first_use(__name__, _MODULES)
 
 # Modules in the order in which their metrics are shown; others follow by name.
 _ORDER = (
-    *("sizes", "statics", "leaping", "speed", "heat", "energy", "tips", "workspace", "grasp"),
+    *(
+        "sizes",
+        "statics",
+        "leaping",
+        "speed",
+        "heat",
+        "energy",
+        "rolling",
+        "tips",
+        "workspace",
+        "grasp",
+    ),
     *("verdict", "impact"),
 )
 

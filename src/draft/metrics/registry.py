@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 Better = Literal["less", "more", ""]
 Needs = Literal["design", "model", "policy"]
-Base = Literal["any", "floating", "fixed", "arm", "hand", "arm or hand", "floating or arm"]
+Base = Literal[
+    "any", "floating", "fixed", "wheels", "arm", "hand", "arm or hand", "floating or arm"
+]
 F = TypeVar("F", bound=Callable[[Any], Any])
 
 
@@ -39,7 +41,7 @@ class Metric:
         batch: whether a function of a Model also takes a ModelBatch and returns an array of shape
             (models,); otherwise models are built one by one.
         base: kinds of machine that have it, of `draft.design.machine.kinds`: "floating" for what is
-            about walking, "arm" or "hand" on a fixed base.
+            about walking, "wheels" for what stands on driven ones, "arm" or "hand" on a fixed base.
         sampled: whether it takes many poses of each design, thousands of times as long as a closed
             form: screens, comparisons and sensitivities have it only by name.
         limits: function from one Design to what limits the metric; None if nothing is named.
@@ -129,6 +131,7 @@ def of_spec(spec: Spec, names: Iterable[str] | None = None) -> dict[str, Metric]
     Args:
         spec: the robot.
         names: those to choose from; None for all.
+        rolls: whether it is on driven wheels.
     """
     chosen = METRICS if names is None else names
     return {name: METRICS[name] for name in chosen if METRICS[name].fits(spec)}
@@ -149,7 +152,9 @@ def misfit(name: str, spec: Spec) -> Problem | None:
     metric = find(name)
     if metric.fits(spec):
         return None
-    if spec.floating or metric.base == "floating":
+    if metric.base == "wheels":
+        cause = "robots on driven wheels; this one has none"
+    elif spec.floating or metric.base == "floating":
         other = "floating" if metric.base == "floating" else "fixed"
         cause = f"robots on a {other} base; this one "
         cause += "floats" if spec.floating else "is fixed to the world"

@@ -69,7 +69,7 @@ def shipped() -> tuple[str, ...]:
     """Names of the robots that Draft and its extensions ship.
 
     >>> draft.shipped()
-    ('arm', 'biped', 'hand', 'hexapod', 'hopper', 'humanoid', 'quadruped')
+    ('arm', 'biped', 'hand', 'hexapod', 'hopper', 'humanoid', 'quadruped', 'wheeled')
     """
     return tuple(sorted(FOLDERS))
 

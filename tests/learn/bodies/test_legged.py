@@ -17,6 +17,7 @@ import pytest
 import draft
 from draft.errors import DraftError, RefusedError
 from draft.learn.bodies.legged import CLASSES, LeggedRobot, check_family, legged_robot
+from tests.helpers import wheeled
 from tests.learn.small import member
 
 SHIPPED = Path(draft.__file__).parent / "robots" / "quadruped"
@@ -243,6 +244,13 @@ def test_robots_that_cannot_be_trained_are_refused_with_the_cause(
     with pytest.raises(DraftError) as caught:
         legged_robot(changed(tmp_path / "robot", *edits))
     assert str(caught.value) == f"quadruped cannot be trained: {cause}\n  {ONLY}"
+
+
+def test_a_robot_on_driven_wheels_is_refused_as_its_actions_would_be_angles() -> None:
+    with pytest.raises(DraftError) as caught:
+        legged_robot(wheeled().resolve())
+    cause = "tester cannot be trained: its joint FL_roll drives a wheel by its speed"
+    assert caught.value.problems[0].cause == cause
 
 
 def test_without_a_home_pose_legs_crouch_and_other_joints_stay_at_zero(tmp_path: Path) -> None:
