@@ -361,7 +361,7 @@ WORDS = {
             "robot",
             "--metrics",
             "mass",
-            "payload_rated",
+            "foot_force",
             "--vary",
             VARIED,
             "--out",
