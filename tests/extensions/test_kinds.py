@@ -175,7 +175,7 @@ def test_a_robot_of_an_extension_is_known_by_name(install: Install, tmp_path: Pa
     shutil.copytree(HOPPER, tmp_path / "robots" / "pogo")
     folder = str(tmp_path / "robots")
     install("ext_robots", f"from draft.extend import robots\nrobots({folder!r}, __name__)")
-    own = ("arm", "biped", "hand", "hexapod", "hopper", "humanoid", "quadruped")
+    own = ("arm", "biped", "hand", "hexapod", "hopper", "humanoid", "quadruped", "wheeled")
     assert draft.shipped() == tuple(sorted((*own, "pogo")))
     assert draft.load("pogo").resolve().mass == draft.load("hopper").resolve().mass
     with pytest.raises(draft.SpecError, match="did you mean 'pogo'"):

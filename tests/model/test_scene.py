@@ -28,6 +28,9 @@ def _lowest(scene: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
     half = scene.geom_size[geom]
     if scene.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE:
         return data.geom_xpos[geom, 2] - half[0]
+    if scene.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CYLINDER:  # A wheel with a level axle.
+        assert abs(data.geom_xmat[geom, 8]) < 1e-9
+        return data.geom_xpos[geom, 2] - half[0]
     return data.geom_xpos[geom, 2] - np.abs(data.geom_xmat[geom].reshape(3, 3)[2]) @ half
 
 

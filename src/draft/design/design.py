@@ -318,12 +318,6 @@ class Design:
         return tuple(i for i, end in ends if end is not None and end.is_foot)
 
     @property
-    def rolls(self) -> bool:
-        """Whether it stands on driven wheels."""
-        joints = (self.bodies[i].joint for i in self.feet)
-        return any(joint is not None and joint.rolls and joint.actuator for joint in joints)
-
-    @property
     def base_mass(self) -> Value:
         """Mass of the trunk, or of the fixed base [kg], without what is attached to it."""
         return self.bodies[0].end_mass if self.lofted is None else self.lofted.mass

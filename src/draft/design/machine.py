@@ -41,10 +41,10 @@ def machine(design: Design) -> str:
         'robot on 4 legs'
     """
     if design.floating:
-        legs = count(design)
+        legs, rolls = count(design), "wheels" in kinds(design.spec)
         if legs:
-            return f"robot on {counted(legs, 'leg')}{' with wheels' if design.rolls else ''}"
-        if design.rolls:
+            return f"robot on {counted(legs, 'leg')}{' with wheels' if rolls else ''}"
+        if rolls:
             return "robot on wheels"
         return "robot on feet without knees" if design.feet else "floating robot without legs"
     arm, fingers = branches(design.spec)
