@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from draft.design.machine import machine
+from draft.errors import DraftError
 from draft.metrics import METRICS, limits, of_design
 from draft.metrics.rolling import RESISTANCE, driven_wheels, rolling_power_at
 from draft.values import scalar
@@ -23,7 +24,8 @@ def test_only_robots_on_driven_wheels_have_them() -> None:
     assert all(0 < scalar(found[name]) < math.inf for name in OWN)
     walking = robot().resolve()
     assert not {*OWN} & {*of_design(walking)}
-    assert np.isnan(of_design(walking, ["rolling_speed"])["rolling_speed"])
+    with pytest.raises(DraftError, match="robots on driven wheels; this one has none"):
+        of_design(walking, ["rolling_speed"])
 
 
 def test_the_machine_is_called_by_its_wheels() -> None:

@@ -25,10 +25,10 @@ def kinds(spec: Spec) -> frozenset[str]:
 
 def _rolls(body: Body) -> bool:
     """Whether a robot stands on the link of a body, and it is a driven wheel."""
-    link, end = body.link, body.link.end
+    link = body.link
     wheel = link.end_type is not None and issubclass(link.end_type, WheelPart)
     driven = link.joint is not None and link.joint.actuator is not None
-    return wheel and driven and end is not None and end.fields.site is not None
+    return wheel and driven and bool(link.sites)
 
 
 def machine(design: Design) -> str:
