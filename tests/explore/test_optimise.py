@@ -21,7 +21,7 @@ from draft.explore.front import Entry, best
 from draft.explore.search import Search, evaluate, first_designs
 from draft.explore.storage import FILE, STUDY, SqliteLog
 from draft.files import held
-from draft.metrics import of_design
+from draft.metrics import grasp, of_design
 from tests.commands import Command
 from tests.explore.small import VARY, job, metric
 from tests.written import files_below
@@ -74,6 +74,22 @@ def test_a_search_begins_with_designs_that_meet_the_constraints() -> None:
     for values in first:
         assert values["thigh_length"] > 0.45
         assert SPEC.resolve(values).accepted
+
+
+def test_a_search_begins_without_what_takes_many_poses_of_each_design(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def never(design: draft.Design) -> float:
+        raise AssertionError(f"{design.count} designs are sampled")
+
+    monkeypatch.setattr(grasp, "grasps", never)
+    hand = draft.load("hand")
+    conditions = goals.constraints(hand, ["mass < 0.68", "pinch_force > 5"])
+    run = job(hand, kind="optimise", vary=("tip_length=0.025:0.05",))
+    one = Search(run, goals.goals(hand, ["mass"], []), conditions, trials=10)
+    first = first_designs(one, 10)
+    assert len(first) == 10
+    assert all(hand.resolve(values).mass < 0.68 for values in first)
 
 
 Run = Callable[..., dict[str, Any]]

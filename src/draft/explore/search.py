@@ -255,12 +255,16 @@ def measure(search: Search, design: Design, drawn: Mapping[str, Array]) -> dict[
 def first_designs(search: Search, count: int) -> list[dict[str, float]]:
     """Values of the first designs: those of a screen with the least violation.
 
-    Constraints that need a model are not part of the screen.
+    Constraints that need a model, or many poses of each design, are not part of the screen.
     """
     job = search.job
     drawn = job.draw(0, SCREENED)
     design = job.resolve(drawn)
-    closed = [c for c in search.constraints if not c.holds.needs_model]
+    closed = [
+        c
+        for c in search.constraints
+        if not c.holds.needs_model and not any(m.find(name).sampled for name in c.holds.metrics)
+    ]
     names = {name for one in closed for name in one.holds.metrics}
     found = m.of_design(design, names)
     violation = sum((one.violation(design, found) for one in closed), np.zeros(SCREENED))
