@@ -174,11 +174,11 @@ def test_a_robot_that_cannot_stand_weighs_at_most_what_its_torques_hold() -> Non
 
 def test_the_band_of_a_robot_without_legs_is_that_of_such_robots() -> None:
     record = beyond().without_legs
-    mass = expected(ARM, "arm")
-    low, _ = draft.load("arm").resolve().mass_band()
+    mass = expected(ARM, "limb")
+    low, _ = draft.load("limb").resolve().mass_band()
     grown = math.log(mass.low / mass.mass) ** 2 - math.log(float(low) / mass.mass) ** 2
     assert math.sqrt(grown) == pytest.approx(1.6449 * record.sigma, rel=1e-3)
-    assert mass.wider == ("the surveyed robots have legs",)
+    assert mass.wider == ("few arms and hands are known by their links",)
 
 
 @pytest.mark.skipif(not ROBOTS.is_dir(), reason="the robots are not beside this folder")
