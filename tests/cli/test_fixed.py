@@ -21,8 +21,8 @@ CLOSED = {*OWN} - {"accepted", "workspace_volume", "reflected_mass"}
 
 @pytest.fixture(autouse=True)
 def robots(robot: Path) -> None:
-    """The folders `arm` and `hand`, each of two files, beside the robot with a leg."""
-    for name, files in (("arm", fixed.ARM), ("hand", fixed.HAND)):
+    """The folders `bench_arm` and `bench_hand`, each of two files, beside the robot with a leg."""
+    for name, files in (("bench_arm", fixed.ARM), ("bench_hand", fixed.HAND)):
         Path(name).mkdir()
         for file, text in files.items():
             (Path(name) / file).write_text(text, encoding="utf-8")
@@ -30,10 +30,10 @@ def robots(robot: Path) -> None:
 
 def test_check_and_metrics_agree_on_what_it_is(command: Command) -> None:
     for name, kind in (
-        ("arm", "fixed arm, 18.1 kg"),
-        ("hand", "hand of 4 fingers on a fixed base"),
+        ("bench_arm", "fixed arm, 18.1 kg"),
+        ("bench_hand", "hand of 4 fingers on a fixed base"),
     ):
-        verdict = f"tester_{name} (default): accepted, {kind}"
+        verdict = f"{name.replace('bench', 'tester')} (default): accepted, {kind}"
         assert verdict in command(f"check {name}").out
         found = command(f"metrics {name}").out
         assert verdict in found
@@ -53,7 +53,7 @@ def test_a_robot_without_legs_that_floats_is_not_judged_by_either(command: Comma
 
 
 def test_metrics_of_legs_are_absent_and_not_without_a_value(command: Command) -> None:
-    found = command.json("metrics arm")
+    found = command.json("metrics bench_arm")
     assert tuple(found["metrics"]) == OWN
     assert None not in found["metrics"].values()
     bases = {one["name"]: one["base"] for one in command.json("metrics")}
@@ -63,13 +63,13 @@ def test_metrics_of_legs_are_absent_and_not_without_a_value(command: Command) ->
     assert {name for name in METRICS if bases[name] in ("any", "arm", "floating or arm")} >= {
         name for name in OWN if bases[name] != "arm or hand"
     }
-    hand = command.json("metrics hand")["metrics"]
+    hand = command.json("metrics bench_hand")["metrics"]
     assert {"pinch_force", "opposability", "fingertip_force", "grasp_largest"} <= {*hand}
     assert not {"reach", "payload_peak", "workspace_volume"} & {*hand}
     assert None not in [x for name, x in hand.items() if name != "hold_time"]
 
 
-@pytest.mark.parametrize("name", ["arm", "hand"])
+@pytest.mark.parametrize("name", ["bench_arm", "bench_hand"])
 def test_it_is_shown_built_and_exported(command: Command, name: str) -> None:
     shown = command(f"show {name}").out
     assert "stand" not in shown
@@ -80,11 +80,11 @@ def test_it_is_shown_built_and_exported(command: Command, name: str) -> None:
     assert {"robot.urdf", "robot.glb", "scene.xml"} <= {path.name for path in Path("out").iterdir()}
     assert "not simulated" not in command(f"check {name} --simulate").out
     report = command.json(f"build {name} --out other")
-    assert report["name"] == f"tester_{name}"
+    assert report["name"] == name.replace("bench", "tester")
 
 
 def test_a_weak_arm_is_refused_by_what_it_must_hold(command: Command) -> None:
-    said = command("check arm --set actuators.large.peak_torque=12", code=1).out
+    said = command("check bench_arm --set actuators.large.peak_torque=12", code=1).out
     assert "cannot_hold holding the home pose takes" in said
     assert "at 'lift'" in said
     assert "refused, fixed arm" in said
@@ -94,29 +94,31 @@ def test_searches_over_its_parameters_take_its_metrics(command: Command) -> None
     pytest.importorskip("optuna")
     pytest.importorskip("pyarrow")
     vary = "--vary pedestal_mass=0:40 actuators.large.peak_torque=30:200"
-    screen = command.json(f"screen arm {vary} --n 64 --where 'accepted and mass < 18' --out s")
+    screen = command.json(
+        f"screen bench_arm {vary} --n 64 --where 'accepted and mass < 18' --out s"
+    )
     assert 0 < screen["rows"] < 64
     where = "--where 'reach > 0.9 and payload_peak > 5'"
-    few = command.json(f"screen arm {vary} forearm_length=0.2:0.6 --n 64 {where} --out u")
+    few = command.json(f"screen bench_arm {vary} forearm_length=0.2:0.6 --n 64 {where} --out u")
     assert 0 < few["rows"] < 64
     vary_hand = "--vary actuators.servo.peak_torque=1:3"
-    few = command.json(f"screen hand {vary_hand} --n 16 --where 'pinch_force > 37' --out v")
+    few = command.json(f"screen bench_hand {vary_hand} --n 16 --where 'pinch_force > 37' --out v")
     assert 0 < few["rows"] < 16
-    assert command.json(f"sweep arm {vary} --n 4 --out t")["designs"] == 4
-    command(f"optimise arm {vary} --minimise mass --maximise payload_peak --trials 8 --out o")
+    assert command.json(f"sweep bench_arm {vary} --n 4 --out t")["designs"] == 4
+    command(f"optimise bench_arm {vary} --minimise mass --maximise payload_peak --trials 8 --out o")
     assert "'top_speed' is of robots on a floating base" in command.refuses(
-        f"optimise arm {vary} --maximise top_speed --out p"
+        f"optimise bench_arm {vary} --maximise top_speed --out p"
     )
-    table = command.json("sensitivity arm")
+    table = command.json("sensitivity bench_arm")
     assert {*table["metrics"]} >= CLOSED
 
 
 def test_it_is_compared_with_a_robot_on_legs_by_what_both_have(command: Command) -> None:
     pytest.importorskip("plotly")
-    found = command("compare arm robot").out
+    found = command("compare bench_arm robot").out
     assert "mass" in found
     assert "jump_height" not in found
-    command("report arm robot hand --out page.html")
+    command("report bench_arm robot bench_hand --out page.html")
     page = Path("page.html").read_text(encoding="utf-8")
     assert "tester_arm" in page
     assert "not judged" not in page

@@ -46,17 +46,21 @@ def test_every_row_is_the_model_built_alone(
 
 
 def test_metrics_of_a_batch_are_those_of_models_built_alone(tmp_path: Path) -> None:
-    names = [name for name, one in METRICS.items() if one.batch]
-    assert names == ["foot_inertia", "impact_mitigation", "reflected_share"]
-    for robot in ("quadruped", "humanoid"):
+    of_legs = ["foot_inertia", "impact_mitigation", "reflected_share"]
+    for robot, first, second, names in (
+        ("quadruped", "thigh_length", "shank_length", of_legs),
+        ("humanoid", "thigh_length", "shank_length", of_legs),
+        ("arm", "upper_arm_length", "forearm_length", ["reflected_mass"]),
+    ):
         spec = draft.load(robot)
-        words = ("thigh_length=0.2:0.4", "shank_length=0.2:0.4")
+        assert [name for name, one in METRICS.items() if one.batch and one.fits(spec)] == names
+        words = (f"{first}=0.2:0.4", f"{second}=0.2:0.4")
         one = job(spec, 16, "sweep", metrics=names, vary=words, chunk=8)
         run_sweep(one, tmp_path / robot, HERE)
         found = rows(tmp_path / robot)
         assert sum(row["accepted"] for row in found) > 8
         for row in found:
-            values = {key: row[key] for key in ("thigh_length", "shank_length")}
+            values = {key: row[key] for key in (first, second)}
             if row["accepted"]:
                 alone = of_model(spec.resolve(values).build(), names)
                 assert {name: row[name] for name in names} == pytest.approx(alone, rel=1e-9)

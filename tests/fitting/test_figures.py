@@ -13,7 +13,7 @@ from draft.fitting.structure import fits
 from draft.fitting.structure import survey_figures as figures
 from draft.fitting.structure.robots import robots
 from draft.laws.catalogue import catalogue
-from draft.laws.structure import population
+from draft.laws.structure import link_laws, population
 from draft.plotting import STYLE
 
 pyplot = pytest.importorskip("matplotlib.pyplot")
@@ -44,7 +44,8 @@ def test_every_class_with_a_law_has_a_panel() -> None:
     laws = {kind for own in PEOPLE.values() for kind in fits.structure(own).fits}
     titles = [ax.get_title().replace(" ", "_") for ax in figures.by_class(PEOPLE).axes]
     assert sorted(titles) == sorted(laws)
-    assert {kind for name in PEOPLE for kind in population(name).segments} - {"other"} <= laws
+    own = {kind for name in PEOPLE for kind in population(name).segments}
+    assert own - {"other", *link_laws()} <= laws
 
 
 def test_a_panel_holds_every_row_of_its_fit() -> None:

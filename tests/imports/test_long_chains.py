@@ -48,11 +48,15 @@ def gaps(found: Imported) -> tuple[float, float]:
     for _ in range(10):
         for name, own in found.joints.items():
             a.joint(name).qpos[0] = b.joint(own).qpos[0] = rng.uniform(-1.0, 1.5)
-        b.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+        base = np.zeros(3)
+        if ours.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE:
+            b.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+        else:
+            base = ours.body_pos[1]  # A fixed base is raised until nothing is below the floor.
         mujoco.mj_kinematics(theirs, a)
         mujoco.mj_kinematics(ours, b)
         for name, own in found.joints.items():
-            gap = a.joint(name).xanchor - b.joint(own).xanchor
+            gap = a.joint(name).xanchor - (b.joint(own).xanchor - base)
             axis = np.cross(a.joint(name).xaxis, b.joint(own).xaxis)
             most = [
                 max(x, float(np.linalg.norm(y))) for x, y in zip(most, (gap, axis), strict=True)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from draft.laws.actuators import SETS, laws
 from draft.laws.law import Law, Term, quantile
-from draft.laws.structure import Population, population
+from draft.laws.structure import Population, link_laws, population
 
 PEOPLE = ("humanoid", "quadruped")
 positive = st.floats(1e-2, 1e2)
@@ -40,7 +40,7 @@ def test_a_shipped_law_says_what_it_needs_and_how_far_to_trust_it(law: Law) -> N
     assert len(law.input_units) == len(law.inputs)
     assert all(law.input_units)
     assert all(len(term.exponents) == len(law.inputs) for term in law.terms)
-    assert law.n >= 5
+    assert law.n >= (3 if law.name in link_laws() else 5)
     if law.name == "allometry":
         # Not fitted here: 14 of the robots behind it are not at hand.
         assert law.source.startswith("released data")
@@ -49,9 +49,13 @@ def test_a_shipped_law_says_what_it_needs_and_how_far_to_trust_it(law: Law) -> N
         return
     assert set(law.ranges) == set(law.inputs)
     assert all(0 < low < high for low, high in law.ranges.values())
-    assert set(law.held_out) in ({"row", "vendor", "family"}, {"robot", "maker"})
     assert law.fold is not None
-    assert 1.0 < law.fold <= min(law.held_out.values()) * 1.01
+    assert law.fold > 1.0
+    if law.name in link_laws():  # Of arms only the span is known, and fingers are few.
+        assert set(law.held_out) == ({"maker"} if law.name == "finger" else set())
+    else:
+        assert set(law.held_out) in ({"row", "vendor", "family"}, {"robot", "maker"})
+    assert law.fold <= min(law.held_out.values(), default=math.inf) * 1.01
 
 
 @pytest.mark.parametrize("law", SHIPPED)

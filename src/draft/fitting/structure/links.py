@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,8 @@ def _finger() -> Law:
     points = Points(length, mass, [row["hand"] for row in used])
     held = ("maker", SOURCE.format("phalanges"))
     formula = "m = {:.3g} L^{:.2f}"
-    return fitted_law("finger", "kg", formula, ("length", "m"), points, power_law, held, PAGE)
+    law = fitted_law("finger", "kg", formula, ("length", "m"), points, power_law, held, PAGE)
+    return replace(law, beyond="proportional")
 
 
 def _arm(row: dict[str, str]) -> Law:
