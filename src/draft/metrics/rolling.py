@@ -8,7 +8,7 @@ Dynamics, SAE 1992, chapter 4.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -21,9 +21,9 @@ from draft.design.legs import GRAVITY
 from draft.design.loads import loads
 from draft.metrics.limiting import Limit
 from draft.metrics.registry import metric
-from draft.metrics.statics import heat
+from draft.metrics.statics import heat, least
 from draft.spec.primitives.wheel import WheelPart
-from draft.values import Value, clip, divide, maximum, minimum, scalar, where
+from draft.values import Value, clip, divide, maximum, scalar, where
 
 # Rolling resistance over weight [1]: car tyres on concrete, table 4.1 of the source. Small hard
 # wheels on smooth floors are near it, soft tyres and carpets well above.
@@ -87,7 +87,7 @@ def rolling_speed(design: Design) -> Value:
     The slowest wheel counts. The drag of air is neglected: at 5 m/s it is some newtons.
     """
     found = driven_wheels(design)
-    return _least(_fastest(design, wheel, len(found)) for wheel in found)
+    return least(_fastest(design, wheel, len(found)) for wheel in found)
 
 
 @metric(
@@ -162,8 +162,3 @@ def rolling_power_at(design: Design, speed: Value) -> Value:
         torque = _torque(design, wheel, len(found)) + wheel.actuator.damping * turning
         power = power + torque * turning + wheel.actuator.copper_loss * torque * torque
     return where(speed <= rolling_speed(design), power, math.nan)
-
-
-def _least(values: Iterable[Value]) -> Value:
-    found = list(values)
-    return minimum(*found) if found else math.nan
