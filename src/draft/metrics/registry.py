@@ -159,13 +159,13 @@ def misfit(name: str, spec: Spec) -> Problem | None:
         cause = f"robots on a {other} base; this one "
         cause += "floats" if spec.floating else "is fixed to the world"
     else:
-        cause = f"a fixed {metric.base}; this one has " + _LACKS.get(metric.base, "no driven joint")
+        kind = metric.base.removeprefix("floating or ")
+        cause = f"a fixed {kind}; this one has {_LACKS.get(kind, 'no driven joint')}"
     return Problem(f"'{name}' is of {cause}", None, f"use {', '.join(of_spec(spec))}")
 
 
 _LACKS = {
     "arm": "no arm: its driven joints branch at the base",
-    "floating or arm": "no arm: its driven joints branch at the base",
     "hand": "no fingers: its driven joints do not branch",
 }
 
