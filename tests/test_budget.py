@@ -29,10 +29,10 @@ BUDGET = {
     "model": 4_010,
     "reporting": 1_820,
     "serving": 550,
-    "spec": 4_770,
+    "spec": 4_780,
     "studio": 3_160,
     "study": 6_470,
-    "twins": 1_590,
+    "twins": 1_600,
     "validation": 990,
     "variation": 350,
 }

@@ -49,7 +49,7 @@ def test_the_shipped_fingers_are_the_gathered_ones() -> None:
         with path.open(newline="", encoding="utf-8") as file:
             return list(csv.DictReader(file))
 
-    shipped = of(Path(draft.__file__).parent / "fitting/structure/data/phalanges.csv")
+    shipped = of(Path(draft.__file__).parent / "fitting/data/phalanges.csv")
     gathered = of(SHARED / "phalanges.csv")
     assert [(r["hand"], r["link"]) for r in shipped] == [(r["hand"], r["link"]) for r in gathered]
     for ours, theirs in zip(shipped, gathered, strict=True):
@@ -77,7 +77,7 @@ def test_the_link_of_a_cobot_weighs_by_its_length_and_has_a_band() -> None:
     (segment,) = [one for one in design.segments if one.trend is not None]
     assert segment.mass == pytest.approx(link_laws()["cobot_link"](0.35))
     (row,) = [row for row in report(design)["segments"] if row["origin"] == "trend"]
-    assert row["source"] == "draft/fitting/structure/data/arms.csv; docs/structure-trends.md"
+    assert row["source"] == "draft/fitting/data/arms.csv; docs/structure-trends.md"
     assert "whole_robot_held_out_error" not in row  # That of robots with legs.
     assert not [one for one in design.findings if one.where == design.name]
 

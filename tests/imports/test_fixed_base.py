@@ -81,6 +81,26 @@ def test_a_machine_without_legs_is_imported_on_a_fixed_base(
     assert segment in said[0]
 
 
+def test_the_pedestal_is_the_box_of_the_makers_base(tmp_path: Path) -> None:
+    file = urdf(tmp_path, 1, 60, 0.3)
+    beside = file.read_text().replace("<visual>", '<visual><origin xyz="0.2 -0.1 0.05"/>')
+    file.write_text(beside, encoding="utf-8")
+    model = import_robot(file, tmp_path / "out").spec.resolve().build().mujoco
+    solid = model.geom("base_pedestal")
+    assert solid.size == pytest.approx((0.05, 0.05, 0.1))
+    assert solid.pos == pytest.approx((0.2, -0.1, 0.05))  # From its base, as in the file.
+
+
+def test_the_twin_of_a_spec_on_a_fixed_base_is_on_one(tmp_path: Path) -> None:
+    file = urdf(tmp_path, 1, 60, 0.3)
+    found = import_robot(file, tmp_path / "out")
+    twin = draft.compare_twin(file, found.spec, poses=2)
+    assert twin.files.fixed
+    assert max(pair.anchor_gap for pair in twin.links) < 1e-6  # The base stands 0.1 m higher.
+    assert max(pair.axis_gap for pair in twin.links) < 1e-6
+    assert twin.expected.wider == ("few arms and hands are known by their links",)
+
+
 def test_a_population_that_is_named_makes_it_a_robot_with_a_trunk(tmp_path: Path) -> None:
     found = import_robot(urdf(tmp_path, 1, 60, 0.3), tmp_path / "out", population="humanoid")
     assert found.spec.resolve().floating
@@ -100,6 +120,7 @@ def test_the_twin_of_an_arm_is_held_by_its_base(tmp_path: Path) -> None:
     assert len(found.joints) == 6
     assert not found.unmatched
     assert math.isfinite(found.inertia.median)
+    assert max(pair.anchor_gap for pair in found.links) < 1e-4
     assert found.vendor_mass == pytest.approx(float(fixed.arm().resolve().mass), rel=1e-6)
     assert found.mass_ratio == pytest.approx(1.0, abs=0.6)
 
@@ -138,10 +159,13 @@ def test_one_of_several_robots_of_a_file_is_imported_by_its_body(
     said = command.refuses("import", cell(tmp_path), "--out", str(tmp_path / "none"))
     assert "2 bodies on the world: left, right" in said
     assert "--root" in said
-    command(f"import {cell(tmp_path)} --root right --torque 30 --out", tmp_path / "right")
+    said = command(
+        f"import {cell(tmp_path)} --root right --torque 30 --out", tmp_path / "right"
+    ).err
     design = draft.load(tmp_path / "right").resolve()
     assert list(design.joints) == ["right_lift", "right_bend"]
     assert not design.floating
+    assert "no picture" not in said
 
 
 @pytest.mark.parametrize("kind", ["urdf", "mjcf"])

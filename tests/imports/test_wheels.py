@@ -56,6 +56,15 @@ def test_a_wheel_is_a_cylinder_that_turns_without_end_and_stands_on_its_rim(
     assert scalar(design.lowest()) == pytest.approx(0.7, abs=0.02)
 
 
+def test_a_range_that_a_maker_gives_a_wheel_is_left_out_with_a_note() -> None:
+    text = rolling(FOUR).replace('type="continuous"', 'type="revolute"')
+    found = imported(text.replace(TURNS, f'lower="-30" upper="30" {TURNS}'))
+    said = [note.cause for note in found.notes if "has a range" in note.cause]
+    assert said
+    assert said[0].startswith("wheel 'disc0' has a range: it is imported as one without end")
+    assert not [n for n in imported(rolling(FOUR), out="other").notes if "has a range" in n.cause]
+
+
 def test_a_wheel_rolls() -> None:
     # Wheels that roll hold no foot below its hip: the legs' servos must, and need three times the
     # torque of feet on the floor.

@@ -248,6 +248,13 @@ def test_masses_by_the_trends_of_legs_are_named() -> None:
     assert any("robots with legs" in one.message for one in found)
 
 
+def test_a_pedestal_may_stand_beside_its_base() -> None:
+    shifted = {"size": [0.2, 0.1, 0.3], "shift": [0.1, -0.2, -0.05], "mass": 3}
+    model = fixed.pendulum(pedestal=shifted).resolve().build().mujoco
+    assert model.geom("base_pedestal").pos == pytest.approx((0.1, -0.2, 0.1))
+    assert model.body("base").mass[0] == pytest.approx(3.0)
+
+
 def test_the_pedestal_counts_in_the_mass_and_moves_nothing() -> None:
     spec = fixed.arm()
     light, heavy = (spec.resolve({"pedestal_mass": mass}) for mass in (0, 20))

@@ -67,7 +67,7 @@ def main(
     with if_interrupted(NOTHING):
         found = import_robot(file, out, population=population, options=options)
     mass = expected_mass(found.spec.resolve(), found.files)
-    picture = _preview(file, found) if not no_preview else None
+    picture = _preview(file, found, options) if not no_preview else None
     if json:
         record = {
             "folder": str(found.folder),
@@ -89,7 +89,7 @@ def main(
     return 0
 
 
-def _preview(file: Path, found: Imported) -> Path | None:
+def _preview(file: Path, found: Imported, options: Options) -> Path | None:
     """Draw the maker's robot beside the spec where there are meshes; None where it cannot be."""
     if not found.files.shapes.meshes.count or not can_draw():
         return None
@@ -98,7 +98,7 @@ def _preview(file: Path, found: Imported) -> Path | None:
     from draft.twins.look import side_by_side
 
     try:
-        twin = compare_twin(file, found.spec, poses=2)
+        twin = compare_twin(file, found.spec, options=options, poses=2)
         pixels = side_by_side(twin, PREVIEW)
     except DraftError as error:
         print(f"no picture: {error.problems[0].cause}", file=sys.stderr)

@@ -63,8 +63,7 @@ def from_xml(root: Element, within: str = "") -> Description:
     file = root.where.file
     joints, loops = _without_loops(joints)
     if within in links:
-        own = _top(within, joints)
-        links = {name: link for name, link in links.items() if _top(name, joints) == own}
+        links = _tree(within, links, joints)
         joints = {name: joint for name, joint in joints.items() if joint.child in links}
     top = root_of(file, links, joints)
     return Description(
@@ -80,14 +79,18 @@ def from_xml(root: Element, within: str = "") -> Description:
     )
 
 
-def _top(link: str, joints: dict[str, Joint]) -> str:
-    """Root of the tree of a link; in a cycle, a link of it."""
-    above = {joint.child: joint.parent for joint in joints.values()}
-    seen: set[str] = set()
-    while link in above and link not in seen:
-        seen.add(link)
-        link = above[link]
-    return link
+def _tree(within: str, links: dict[str, Link], joints: dict[str, Joint]) -> dict[str, Link]:
+    """Links that joints connect with one of them, in the order of the file."""
+    beside: dict[str, list[str]] = {name: [] for name in links}
+    for joint in joints.values():
+        beside[joint.parent].append(joint.child)
+        beside[joint.child].append(joint.parent)
+    found, waiting = {within}, [within]
+    while waiting:
+        new = [name for name in beside[waiting.pop()] if name not in found]
+        found.update(new)
+        waiting += new
+    return {name: link for name, link in links.items() if name in found}
 
 
 def _without_loops(joints: dict[str, Joint]) -> tuple[dict[str, Joint], tuple[Loop, ...]]:

@@ -70,12 +70,13 @@ def pedestal(reduced: Reduced, shapes: Shapes) -> Node:
     mass = sum(one.mass for one in inertials if one is not None)
     if not len(own) and not shapes.box(links).any():
         return found
+    foot = np.zeros(3)  # middle of the lower face of its box
+    edges = shapes.box(links)
     if len(own):
-        edges = np.array([*2 * np.abs(own[:, :2]).max(axis=0), own[:, 2].max()])
-    else:
-        edges = shapes.box(links)
+        low, edges = own.min(axis=0), np.ptp(own, axis=0)
+        foot = low + edges / 2 * (1, 1, 0)
     size: list[Value] = [tidy(max(float(edge), LEAST), 4) for edge in edges]
-    solid: Node = {"size": size}
+    solid: Node = {"size": size, "shift": [tidy(float(x), 4) for x in foot]}
     if mass > 0:
         solid["mass"] = tidy(mass, 3)
     found["pedestal"] = solid

@@ -267,6 +267,7 @@ def translate(
         *sides.notes(parameters.deviations, where),
         *notes.of_shapes(meshes.notes, middle, description.links[reduced.root.name].where),
         *shapes.notes,
+        *notes.of_wheels(reduced),
     ]
     doc = f"{description.name or path.stem}, imported from {path.name}."
     name = f"{name}_robot" if name in shipped() else name

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from draft.errors import Location, Problem, listed, quoted
+from draft.imports.anatomy import ROLLING
+from draft.imports.reduce import Reduced
 from draft.imports.trunk import NO_MESHES, Trunk
 
 REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
@@ -65,6 +67,15 @@ def of_shapes(unread: Sequence[Problem], trunk: Trunk | None, where: Location) -
     # A trunk that its maker describes by primitives needs none; the summary names its source.
     described = trunk.fault == NO_MESHES and trunk.source.endswith("primitives")
     return [] if described else [Problem(f"{trunk.fault}: {trunk.instead}", where)]
+
+
+def of_wheels(reduced: Reduced) -> list[Problem]:
+    """Ranges of wheels that the file states and a spec has no place for."""
+    return [
+        Problem(f"wheel '{body.name}' has a range: it is imported as one without end", joint.where)
+        for body in reduced.root.all()
+        if body.role in ROLLING and (joint := body.joint) is not None and joint.limits is not None
+    ]
 
 
 def of_allowed(allowed: Mapping[str, str], where: Location) -> Problem:

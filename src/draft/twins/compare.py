@@ -171,7 +171,8 @@ def compare_twin(
     source = find_source(file)
     path = source.path
     own = None if spec is None else find_design(spec)
-    population = population or (own.spec.population if own is not None else None)
+    if own is not None and own.spec.floating:  # One on a fixed base is no robot of a population.
+        population = population or own.spec.population
     options = replace(options, without=frozenset((*options.without, *without)))
     files = translate(
         source, names.valid(source.name, "robot"), population, options=options, key=key

@@ -7,6 +7,7 @@ All is in the trunk's frame, with every joint at zero.
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -167,9 +168,15 @@ def _outboard(body: Body) -> int:
 
 
 def _at_zero(model: Any) -> Any:
+    """Data of a model with its first body at the origin and all joints at zero."""
+    fixed = model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE
+    if fixed:
+        model = copy.copy(model)
+        model.body_pos[1], model.body_quat[1] = np.zeros(3), (1.0, 0.0, 0.0, 0.0)
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0
-    data.qpos[3] = 1.0
+    if not fixed:
+        data.qpos[3] = 1.0
     mujoco.mj_forward(model, data)
     return data
 

@@ -6,34 +6,26 @@ reproduced. Fingers are fitted link by link; of arms only the span of the mass p
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from draft.fitting import coefficients
-from draft.fitting.limits import Points, fitted_law, power_law
+from draft.fitting.limits import Points, fitted_law, power_law, table
 from draft.laws.law import Law, Term, fold_of_sigma
 from draft.laws.structure import LINKS
 
-DATA = Path(__file__).resolve().parent / "data"
-SOURCE, PAGE = "draft/fitting/structure/data/{}.csv", "docs/structure-trends.md"
+SOURCE, PAGE = "draft/fitting/data/{}.csv", "docs/structure-trends.md"
 # Mean of the largest of n numbers drawn from the standard normal distribution.
 _LARGEST = {3: 0.846, 8: 1.424}
 
 
 def link_trends() -> dict[str, Any]:
     """Content of the file of coefficients."""
-    laws = [_finger(), *(_arm(row) for row in _table("arms"))]
+    laws = [_finger(), *(_arm(row) for row in table("arms"))]
     return coefficients.rounded({law.name: law.record() for law in laws})
-
-
-def _table(name: str) -> list[dict[str, str]]:
-    with (DATA / f"{name}.csv").open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def _finger() -> Law:
@@ -41,7 +33,7 @@ def _finger() -> Law:
 
     Metal links with sensors, and masses that their descriptions only name, are left out.
     """
-    used = [row for row in _table("phalanges") if row["used"] == "yes"]
+    used = [row for row in table("phalanges") if row["used"] == "yes"]
     length, mass = (np.array([float(row[key]) for row in used]) for key in ("length_m", "mass_kg"))
     points = Points(length, mass, [row["hand"] for row in used])
     held = ("maker", SOURCE.format("phalanges"))

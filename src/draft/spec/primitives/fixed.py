@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Pedestal(Model):
-    """The solid of a fixed base, a box or a cylinder about z, which stands on the base's origin."""
+    """The solid of a fixed base, a box or a cylinder along z, which stands on the base's origin."""
 
     size: NumberVector | None = None
     """Full sizes of a box along x, y and z of the base [m]."""
@@ -27,6 +27,8 @@ class Pedestal(Model):
     """Radius of a cylinder [m]."""
     height: Number | None = None
     """Height of a cylinder [m]."""
+    shift: NumberVector | None = None
+    """Middle of its lower face, from the base's origin [m]. Default: at the origin."""
     mass: Number = 0.0
     """Mass [kg]. It counts in the mass of the robot, and moves nothing."""
 
@@ -60,13 +62,14 @@ class FixedBase(Model):
 
 @dataclass(frozen=True, slots=True)
 class PedestalPart(End):
-    """A pedestal: full sizes of a box, or radius and height of a cylinder [m]."""
+    """A pedestal: full sizes of a box, or radius and height of a cylinder, and its shift [m]."""
 
     key: ClassVar[str] = "pedestal"
     of_segment: ClassVar[bool] = False
 
     form: Form
     size: tuple[Value, ...]
+    shift: Vector = g.ZERO
 
     @classmethod
     def read(cls, written: Written[Pedestal], link: str, r: Evaluator) -> PedestalPart:
@@ -79,12 +82,13 @@ class PedestalPart(End):
             r.positive(number, f"{key} of the pedestal of {link}")
             for key, number in zip(keys, numbers, strict=True)
         )
-        return cls(mass, None, form, size)
+        shift = r.vector(written.triple("shift")) if "shift" in written.numbers else g.ZERO
+        return cls(mass, None, form, size, shift)
 
     @property
     def center(self) -> Vector:
         """Centre of the pedestal, from the base's origin [m]."""
-        return (0.0, 0.0, self.size[-1] / 2)
+        return g.add(self.shift, (0.0, 0.0, self.size[-1] / 2))
 
     def geom(self, tip: Vector, mass: Value) -> Geom:
         """Return the pedestal, in the colour of a trunk."""
