@@ -9,7 +9,7 @@ no key of a file has parentheses.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import (
@@ -84,6 +84,21 @@ def broken_rule(cause: str, remedy: str) -> PydanticCustomError:
     return PydanticCustomError("broken_rule", "{cause}", {"cause": cause, "remedy": remedy})
 
 
+def unknown_keys(
+    data: Iterable[object], known: Sequence[str], absent: Mapping[str, str] | None = None
+) -> PydanticCustomError:
+    """Error for a validator to raise about keys of a mapping that are not known.
+
+    Args:
+        data: keys of the mapping.
+        known: keys that may be there.
+        absent: what to do about keys that others like it have, and it has not.
+    """
+    unknown = [key for key in data if key not in known]
+    context = {"unknown": unknown, "known": [*known], "absent": absent or {}}
+    return PydanticCustomError("unknown_keys", "", context)
+
+
 class Model(BaseModel):
     """Base of all models here: unknown keys are errors, values are frozen."""
 
@@ -96,9 +111,5 @@ class Model(BaseModel):
     def _known_keys(cls, data: object) -> object:
         """Report unknown keys first: a misspelt key would be reported as missing otherwise."""
         if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
-            unknown = [key for key in data if key not in cls.model_fields]
-            known = list(cls.model_fields)
-            raise PydanticCustomError(
-                "unknown_keys", "", {"unknown": unknown, "known": known, "absent": cls.absent}
-            )
+            raise unknown_keys(data, list(cls.model_fields), cls.absent)
         return data

@@ -27,6 +27,7 @@ from draft.learn.task.recipes import RECIPES
 from draft.learn.task.stages import PUBLISHED, STAGES, StageName
 from draft.learn.training.options import TaskOptions, TrainOptions
 from draft.settings import expected
+from draft.spec.field_types import unknown_keys
 from draft.spec.load import validate
 from draft.spec.reader import Path_, Source, read_file
 from draft.spec.schema import Model
@@ -205,8 +206,8 @@ class StudyFile(Model):
             return data
         shared = [_KEYS.get(name, name) for name in Trainings.model_fields]
         known = [*(name for name in cls.model_fields if name != "trainings"), *shared]
-        if unknown := [key for key in data if key not in known]:
-            raise PydanticCustomError("unknown_keys", "", {"unknown": unknown, "known": known})
+        if not data.keys() <= set(known):
+            raise unknown_keys(data, known)
         own = {key: value for key, value in data.items() if key not in shared}
         return own | {"trainings": {key: data[key] for key in shared if key in data}}
 
