@@ -71,7 +71,8 @@ def test_a_joint_of_another_link_needs_a_range_and_hears_of_wheels() -> None:
     assert refused(error) == (
         "tree.yaml",
         "'range' is missing in chains.leg[2].joint",
-        "add 'range: ...'; only the joint of a link of 'type: wheel' has none",
+        "add 'range: ...'; only the joint of a link of 'type: wheel', and one that 'follows' "
+        "another, have none",
     )
 
 

@@ -29,6 +29,7 @@ KINDS: dict[str, str] = {
     "cannot_stand": "standing in the home pose needs more than the peak torque of a joint",
     "cannot_hold": "holding a fixed base's home pose needs more than the peak torque of a joint",
     "no_legs": "no limb reaches the ground: the structure trends are those of robots with legs",
+    "coupled_leg": "a joint of a leg follows another: its loads are not judged",
     "not_physical": "an invalid number: not finite, a length of zero, outside its bounds",
     "aspect_ratio": "length over diameter outside the catalogue's",
     "stated_value": "a stated value outside what was built by more than a factor of 3",

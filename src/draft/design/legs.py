@@ -2,6 +2,7 @@
 
 A leg is a serial run of bodies that no other leg shares, down to a foot: a sphere or plate with a
 site. It has a knee: the first hinge of a link of class `shank`. A robot without a knee has no legs.
+No joint of a leg follows another, as its pose and its loads would have to.
 
 The pose is that of `draft.design.crouch`.
 """
@@ -139,6 +140,7 @@ def _find_runs(design: Design) -> list[list[tuple[int, ...]]]:
                 break
     uses = Counter(k for path in by_knee.values() for k in path)
     runs = [tuple(k for k in path if k and uses[k] == 1) for path in by_knee.values()]
+    runs = [run for run in runs if not any(map(follows, (design.bodies[k] for k in run)))]
     grouped: dict[object, list[tuple[int, ...]]] = {}
     for run in runs:
         if run:
@@ -224,10 +226,19 @@ def _joints(
     return tuple(found)
 
 
+def follows(body: Body) -> bool:
+    """Whether the joint of a body follows another one."""
+    return body.joint is not None and body.joint.follows is not None
+
+
 def held_joints(design: Design) -> tuple[LegJoint, ...]:
-    """Hinges of a fixed base in the home pose, each alone; no floor lifts them."""
+    """Hinges of a fixed base in the home pose, each alone; no floor lifts them.
+
+    One that others follow also carries what they move. Those that follow are left out.
+    """
     frames = dict(enumerate(design.frames(home=True)))
     below = moments(design, frames)
+    hangs = hangs_of(design, frames, below)
     return tuple(
         LegJoint(
             body=k,
@@ -236,11 +247,37 @@ def held_joints(design: Design) -> tuple[LegJoint, ...]:
             angle=joint.home,
             lift=0.0,
             sweep=0.0,
-            hang=hang(g.rotate(frames[k][1], joint.axis), frames[k][0], below[k]),
+            hang=hangs[k],
         )
         for k, body in enumerate(design.bodies)
-        if (joint := body.joint) is not None and not joint.slide
+        if (joint := body.joint) is not None and not joint.slide and joint.follows is None
     )
+
+
+def hangs_of(
+    design: Design, frames: Mapping[int, Frame], below: Mapping[int, Vector]
+) -> dict[int, Value]:
+    """First moment of what each joint moves, by its body: sum of m dz/dq [kg m/rad, or kg].
+
+    Those of joints that follow others are part of what the others move.
+
+    Args:
+        design: the design.
+        frames: of all bodies.
+        below: moments of all bodies, see `moments`.
+    """
+    found: dict[int, Value] = {}
+    for k, body in enumerate(design.bodies):
+        joint = body.joint
+        if joint is None:
+            continue
+        axis = g.rotate(frames[k][1], joint.axis)
+        own = below[k][0] * axis[2] if joint.slide else hang(axis, frames[k][0], below[k])
+        follows = joint.follows
+        share = own if follows is None else own * follows.ratio
+        to = k if follows is None else follows.body
+        found[to] = found.get(to, 0.0) + share
+    return found
 
 
 def hang(axis: Vector, origin: Vector, moment: Vector) -> Value:

@@ -20,7 +20,7 @@ from draft import geometry as g
 from draft.design.actuators import Actuator
 from draft.design.cached import once
 from draft.design.design import Design
-from draft.design.legs import hang, moments
+from draft.design.legs import hangs_of, moments
 from draft.geometry import Frame, Vector
 from draft.spec import Spec
 from draft.values import Value
@@ -121,13 +121,14 @@ def _limb(design: Design, joints: tuple[int, ...], has_fingers: bool) -> Limb:
 
 
 class Column(NamedTuple):
-    """A driven hinge of a limb in a pose.
+    """A driven hinge of a limb in a pose, with the joints of the limb that follow it.
 
     Attributes:
         body: index of the body that it moves.
         name: full name of the joint.
         actuator: its actuator.
-        axis: its unit axis in the world.
+        axis: turn of the last link of the limb per angle, in the world: a unit axis, if no joint
+            follows it.
         arm: motion of the tip per angle, a column of the Jacobian [m/rad].
         torque: torque that holds what it moves against gravity, per g [kg m].
     """
@@ -145,15 +146,33 @@ def frames_at(design: Design, angles: Mapping[int, Value]) -> dict[int, Frame]:
 
     Args:
         design: a design on a fixed base.
-        angles: angles of joints by the bodies that they move [rad]; others are at home.
+        angles: angles of joints by the bodies that they move [rad]; others are at home, or where
+            the joint that they follow puts them.
     """
     bodies = design.bodies
     frames: dict[int, Frame] = {0: (bodies[0].position, bodies[0].rotation)}
     for i, body in enumerate(bodies[1:], start=1):
         placed = body.placed(frames[body.parent or 0], home=False)
-        home = 0.0 if body.joint is None else body.joint.home
-        frames[i] = body.moved(placed, angles.get(i, home))
+        frames[i] = body.moved(placed, _position(design, i, angles))
     return frames
+
+
+def _position(design: Design, body: int, angles: Mapping[int, Value]) -> Value:
+    """Position of the joint of a body, of which angles of some are known [rad or m]."""
+    joint = design.bodies[body].joint
+    if joint is None:
+        return 0.0
+    if (follows := joint.follows) is not None:
+        return follows.of(_position(design, follows.body, angles))
+    return angles.get(body, joint.home)
+
+
+def motion(design: Design, body: int, frames: Mapping[int, Frame], point: Vector) -> Vector:
+    """Motion of a point per motion of the joint of a body alone, in the world [m/rad, or 1]."""
+    axis = g.rotate(frames[body][1], design.bodies[body].joint_axis)
+    joint = design.bodies[body].joint
+    slides = joint is not None and joint.slide
+    return axis if slides else g.cross(axis, g.subtract(point, frames[body][0]))
 
 
 def columns(design: Design, limb: Limb, frames: Mapping[int, Frame]) -> tuple[Column, ...]:
@@ -164,7 +183,7 @@ def columns(design: Design, limb: Limb, frames: Mapping[int, Frame]) -> tuple[Co
         limb: one of its limbs.
         frames: of all bodies, in the world.
     """
-    below = moments(design, frames)
+    hangs = hangs_of(design, frames, moments(design, frames))
     origin, rotation = frames[limb.path[-1]]
     tip = g.add(origin, g.rotate(rotation, limb.point))
     found = []
@@ -172,16 +191,23 @@ def columns(design: Design, limb: Limb, frames: Mapping[int, Frame]) -> tuple[Co
         joint = design.bodies[k].joint
         if joint is None or joint.actuator is None:
             continue
-        here, turned = frames[k]
-        axis = g.rotate(turned, joint.axis)
+        axis, arm = g.rotate(frames[k][1], joint.axis), motion(design, k, frames, tip)
+        for i in limb.path:
+            other = design.bodies[i].joint
+            if other is None or other.follows is None or other.follows.body != k:
+                continue
+            ratio = other.follows.ratio
+            arm = g.add(arm, g.scale(motion(design, i, frames, tip), ratio))
+            if not other.slide:
+                axis = g.add(axis, g.scale(g.rotate(frames[i][1], other.axis), ratio))
         found.append(
             Column(
                 body=k,
                 name=design.bodies[k].prefix + joint.name,
                 actuator=design.actuators[joint.actuator],
                 axis=axis,
-                arm=g.cross(axis, g.subtract(tip, here)),
-                torque=hang(axis, here, below[k]),
+                arm=arm,
+                torque=hangs[k],
             )
         )
     return tuple(found)

@@ -15,10 +15,30 @@ from draft.spec.primitives.base import End
 from draft.spec.primitives.basic import MemberPart, MotorPart, PulleyPart
 from draft.spec.primitives.wheel import WheelPart
 from draft.spec.tree import UNMIRRORED, Signs
-from draft.values import Value, is_array
+from draft.values import Value, is_array, maximum, minimum
 
 TURN = (-math.pi, math.pi)  # Angles of a wheel that sliders and poses have [rad].
 _ALONG = 1e-6
+
+
+class Coupling(NamedTuple):
+    """Motion of a joint that follows another: position = ratio x that of the other + offset.
+
+    Attributes:
+        ratio: motion per motion of the other joint [1, or m/rad].
+        offset: position with the other joint at zero [rad or m].
+        joint: full name of the other joint, which follows none itself; "" until it is known.
+        body: index of the body that the other joint moves.
+    """
+
+    ratio: Value
+    offset: Value
+    joint: str = ""
+    body: int = 0
+
+    def of(self, position: Value) -> Value:
+        """Position at a position of the other joint [rad or m]."""
+        return self.ratio * position + self.offset
 
 
 class Joint(NamedTuple):
@@ -36,6 +56,7 @@ class Joint(NamedTuple):
     actuator: str | None
     continuous: bool = False
     rolls: bool = False
+    follows: Coupling | None = None
 
     @property
     def kind(self) -> str:
@@ -117,6 +138,32 @@ def mirrored(link: Link, signs: Signs) -> Link:
     )
 
 
+def coupled(link: Link, leader: Link, name: str, body: int) -> Link:
+    """Link whose joint follows another one, with the range and the home position that follow.
+
+    Args:
+        link: the link.
+        leader: link of the joint that it follows, whose own range is known.
+        name: full name of that joint.
+        body: index of its body.
+    """
+    joint, other = link.joint, leader.joint
+    if joint is None or other is None or joint.follows is None:
+        return link
+    follows = joint.follows._replace(joint=name, body=body)
+    low, high = (follows.of(end) for end in other.range)
+    joint = joint._replace(
+        range=(minimum(low, high), maximum(low, high)),
+        home=follows.of(other.home),
+        continuous=other.continuous and not joint.slide,
+    )
+    if (above := other.follows) is not None:  # Coupled itself: follow what that follows.
+        follows = Coupling(
+            follows.ratio * above.ratio, follows.of(above.offset), above.joint, above.body
+        )
+    return link._replace(joint=joint._replace(follows=follows))
+
+
 def placed(placement: Placement, parent: Link | None, signs: Signs) -> Frame:
     """Frame of a body in that of its parent; of the trunk, which has none, the placement itself.
 
@@ -151,8 +198,15 @@ def _mirrored_joint(joint: Joint, signs: Signs) -> Joint:
 
 
 def _joint(joint: links.Joint, r: Evaluator) -> Joint:
+    axis = r.axis(joint.axis, joint.name)
+    if joint.follows is not None:
+        what = f"ratio of {joint.name}"
+        ratio = r.number(joint.follows.ratio, what)
+        rule = "must not be 0: a joint that stays still needs no coupling"
+        r.require(ratio != 0, joint.follows.ratio, what, ratio, rule)
+        follows = Coupling(ratio, r.number(joint.follows.offset, f"offset of {joint.name}"))
+        return Joint(joint.name, joint.slide, axis, TURN, 0.0, None, follows=follows)
     if joint.range is None:
-        axis = r.axis(joint.axis, joint.name)
         return Joint(joint.name, False, axis, TURN, 0.0, joint.actuator, True, True)
     low = r.number(joint.range[0], f"range of {joint.name}")
     high = r.number(joint.range[1], f"range of {joint.name}")
@@ -169,6 +223,5 @@ def _joint(joint: links.Joint, r: Evaluator) -> Joint:
     limits = "" if is_array(low) or is_array(high) else f" [{low:g}, {high:g}]"
     rule = f"must lie in the joint's range{limits}"
     r.require(inside, joint.home, what, home, rule)
-    axis = r.axis(joint.axis, joint.name)
     span = (low, high)
     return Joint(joint.name, joint.slide, axis, span, home, joint.actuator, joint.continuous)

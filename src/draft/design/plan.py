@@ -7,6 +7,7 @@ and are treated once.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from weakref import WeakKeyDictionary
 
@@ -16,6 +17,7 @@ from draft.laws.catalogue import Part, catalogue, with_rows
 from draft.laws.structure import Population, population, read_population
 from draft.spec import Spec
 from draft.spec.check import expressions, rigid_bases
+from draft.spec.coupling import leaders
 from draft.spec.graph import order
 from draft.spec.links import Link
 from draft.spec.tree import Body, Placement
@@ -79,6 +81,8 @@ class Plan:
         limb_pairs: unique pairs of limbs of which neither is below the other.
         population: structure trends, with the law of the trunk that holds.
         laws: actuator trends.
+        leaders: body of the joint that each coupled joint follows, by the body of the coupled one;
+            each after the one that it follows.
         own: modules of the spec's own table.
         last: results of the last single design.
     """
@@ -97,6 +101,7 @@ class Plan:
     limb_pairs: tuple[tuple[int, int], ...]
     population: Population
     laws: Laws
+    leaders: Mapping[int, int] = field(default_factory=dict)
     own: tuple[Part, ...] = ()
     last: Reuse = field(default_factory=Reuse)
 
@@ -143,6 +148,7 @@ def _make(spec: Spec) -> Plan:
         limb_pairs=_limb_pairs(bodies, limbs, keys),
         population=_population(spec),
         laws=laws(spec.trends) if isinstance(spec.trends, str) else read_laws(spec.trends),
+        leaders=leaders(bodies),
         own=_own(spec),
     )
 

@@ -17,7 +17,15 @@ from draft.design.design import Body, Design, SegmentMass
 from draft.design.filter import inspect
 from draft.design.law_errors import LawErrors
 from draft.design.overrides import Table, read_table
-from draft.design.parts import Link, Placement, mirrored, placed, read_link, read_placement
+from draft.design.parts import (
+    Link,
+    Placement,
+    coupled,
+    mirrored,
+    placed,
+    read_link,
+    read_placement,
+)
 from draft.design.plan import Plan, plan
 from draft.design.reuse import Reuse
 from draft.design.segments import Skeleton, drawn_radii, weigh
@@ -387,6 +395,11 @@ class _Resolver:
             above = None if body.parent is None else links[p.link_of[body.parent]]
             placement = placements[p.placement_of[i]]
             places.append(reuse.result(("place", i), placed, placement, above, body.signs))
+        for i, k in p.leaders.items():
+            leader, joint = spec.bodies[k], spec.bodies[k].link.joint
+            name = leader.prefix + (joint.name if joint is not None else "")
+            follow = partial(coupled, name=name, body=k)
+            own[i] = reuse.result(("coupled", i), follow, own[i], own[k])
         return Skeleton(spec, p, own, places)
 
     def check_moving_masses(self, bodies: list[Body]) -> None:

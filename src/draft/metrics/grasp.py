@@ -174,27 +174,26 @@ def _force(finger: _Finger, levers: Array, unit: Array) -> Array:
 
 
 def _poses(finger: _Finger) -> _Poses:
-    segments = finger.chain.segments
-    levels = max(2, round(POSES ** (1.0 / len(segments))))
-    grid = np.meshgrid(*(np.linspace(one.low, one.high, levels) for one in segments))
+    chain = finger.chain
+    free = [chain.segments[j] for j in chain.driven]
+    levels = max(2, round(POSES ** (1.0 / len(free))))
+    grid = np.meshgrid(*(np.linspace(one.low, one.high, levels) for one in free))
     count = grid[0].size
-    frame: Frame = g.ORIGIN
-    origins: list[Vector] = []
-    axes: list[Vector] = []
-    for one, angles in zip(segments, grid, strict=True):
-        (origin, rotation), (at, placed) = frame, one.place
-        origin = g.add(origin, g.rotate(rotation, at))
-        rotation = g.compose(rotation, placed)
-        origins.append(origin)
-        axes.append(g.rotate(rotation, one.axis))
-        frame = origin, g.compose(rotation, g.about(one.axis, angles.ravel()))
-    tip = g.add(frame[0], g.rotate(frame[1], finger.chain.tip))
-    levers = np.stack(
-        [
-            _rows(g.cross(axis, g.subtract(tip, origin)), count)
-            for axis, origin in zip(axes, origins, strict=True)
-        ]
-    )
+    frames: list[Frame] = [g.ORIGIN]
+    for one, position in zip(
+        chain.segments, chain.positions([a.ravel() for a in grid]), strict=True
+    ):
+        frames.append(one.frame(frames[-1], position))
+    tip = g.add(frames[-1][0], g.rotate(frames[-1][1], chain.tip))
+    moved: dict[int, Vector] = {}
+    for one, (origin, rotation) in zip(chain.segments, frames[1:], strict=True):
+        axis = g.rotate(rotation, one.axis)
+        own = axis if one.slide else g.cross(axis, g.subtract(tip, origin))
+        of, ratio = (
+            (one.body, 1.0) if one.follows is None else (one.follows.body, one.follows.ratio)
+        )
+        moved[of] = g.add(moved.get(of, g.ZERO), g.scale(own, ratio))
+    levers = np.stack([_rows(moved[one.body], count) for one in free])
     size = np.linalg.norm(levers[-1], axis=1, keepdims=True)
     return _Poses(_rows(tip, count), levers[-1] / np.maximum(size, 1e-12), levers)
 

@@ -251,7 +251,31 @@ def pose_inertia(
         for i, here in enumerate(ids):
             point = places[here] + turns[here] @ tips[k, i]
             mujoco.mj_jac(robot, data, jacobians[k, i], None, point, here)
-    return PoseInertia(inertia, jacobians, armature)
+    return _coupled(model, robot, PoseInertia(inertia, jacobians, armature))
+
+
+def _coupled(model: Model | ModelBatch, robot: mujoco.MjModel, found: PoseInertia) -> PoseInertia:
+    """Inertia with the joints that follow others: M' = G' M G and J' = J G for v = G v'.
+
+    Joints that follow are degrees of freedom of their own with unit inertia that move nothing.
+    """
+    inertia, jacobians, armature = found
+    motion = np.tile(np.eye(robot.nv), (len(inertia), 1, 1))
+    followers: list[int] = []
+    for name, joint in model.design.joints.items():
+        if (follows := joint.follows) is None:
+            continue
+        dof, leader = (int(robot.joint(x).dofadr[0]) for x in (name, follows.joint))
+        ratio = _each(model, follows.ratio)
+        followers.append(dof)
+        motion[:, dof, dof], motion[:, dof, leader] = 0.0, ratio
+        armature[:, leader] += ratio**2 * armature[:, dof]
+        armature[:, dof] = 0.0
+    if not followers:
+        return found
+    inertia = motion.swapaxes(1, 2) @ inertia @ motion
+    inertia[:, followers, followers] = 1.0
+    return PoseInertia(inertia, jacobians @ motion[:, None], armature)
 
 
 def _template(model: Model | ModelBatch) -> mujoco.MjModel:

@@ -4,14 +4,17 @@ With all other joints held, the tip moves on a circle about one joint, and its d
 or along a direction is of the form a + A cos q + B sin q, whose largest value in the range of the
 joint is known in closed form. Sweeps over the joints take that step for each of them (cyclic
 coordinate ascent; Wang and Chen 1991, IEEE T-RA 7(4), for the distance to a goal). The first sweeps
-stretch the arm away from its shoulder, the others turn it to the horizontal.
+stretch the arm away from its shoulder, the others turn it to the horizontal. Where joints follow
+others, angles are tried instead.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
+
+import numpy as np
 
 from draft import geometry as g
 from draft.design import Design
@@ -19,23 +22,41 @@ from draft.design.cached import once
 from draft.design.legs import GRAVITY, LegJoint
 from draft.design.limbs import Column, Limb, columns, frames_at, limbs
 from draft.design.loads import Load
+from draft.design.parts import Coupling
 from draft.geometry import Frame, Rotation, Vector
-from draft.values import Mask, Value, atan2, both, cos, either, hypot, maximum, sin, some, where
+from draft.values import (
+    Mask,
+    Value,
+    atan2,
+    both,
+    cos,
+    either,
+    hypot,
+    maximum,
+    minimum,
+    sin,
+    some,
+    where,
+)
 
 START = 0.2  # of the ranges: in the middle arms stand upright, where no direction is best
 SWEEPS = 40  # at most, outwards and back; two for most arms
 _STILL = 1e-12  # of the length of the arm: a sweep that gains less is the last
 _TINY = 1e-9  # of the length of the arm: what moves the tip by less is rounding error
+# Of arms in which joints follow others: sweeps for each goal, angles to try, and steps of zooming.
+_ROUNDS, _TRIALS, _ZOOMS = 4, 33, 4
 
 
 class Segment(NamedTuple):
-    """A driven hinge of a limb, from the one before it.
+    """A driven hinge of a limb, or a joint that follows one, from the one before it.
 
     Attributes:
         body: index of the body that it moves.
         place: its origin and rotation in the frame of the body before it, or in the world [m].
         axis: unit axis in its own frame.
         low, high: its range [rad]; a joint without limits has a whole turn.
+        slide: whether it moves along its axis.
+        follows: motion per motion of the joint that it follows, if it does.
     """
 
     body: int
@@ -43,28 +64,59 @@ class Segment(NamedTuple):
     axis: Vector
     low: Value
     high: Value
+    slide: bool = False
+    follows: Coupling | None = None
+
+    def moved(self, position: Value, v: Vector) -> Vector:
+        """Point of the body that it moves, with the joint at a position [m]."""
+        if self.slide:
+            return g.add(v, g.scale(self.axis, position))
+        return turned(self.axis, position, v)
+
+    def frame(self, before: Frame, position: Value) -> Frame:
+        """Frame of the body that it moves, from that of the body before it."""
+        (origin, rotation), (at, placed) = before, self.place
+        origin = g.add(origin, g.rotate(rotation, at))
+        rotation = g.compose(rotation, placed)
+        if self.slide:
+            return g.add(origin, g.rotate(rotation, g.scale(self.axis, position))), rotation
+        return origin, g.compose(rotation, g.about(self.axis, position))
 
 
 class Chain(NamedTuple):
-    """A limb as its driven hinges, and its tip in the frame of the last body that moves [m]."""
+    """A limb as the joints that move it, and its tip in the frame of the last such body [m]."""
 
     segments: tuple[Segment, ...]
     tip: Vector
 
+    @property
+    def driven(self) -> tuple[int, ...]:
+        """Places of the driven hinges among the segments."""
+        return tuple(j for j, one in enumerate(self.segments) if one.follows is None)
+
+    def positions(self, angles: Sequence[Value]) -> list[Value]:
+        """Positions of all segments [rad or m], from the angles of the driven hinges."""
+        by_body = {self.segments[j].body: a for j, a in zip(self.driven, angles, strict=True)}
+        return [
+            by_body[one.body] if one.follows is None else one.follows.of(by_body[one.follows.body])
+            for one in self.segments
+        ]
+
 
 def chain(design: Design, limb: Limb) -> Chain:
-    """Driven hinges of a limb, with joints that are not driven at home."""
+    """Joints of a limb: its driven hinges, and those that follow them; others are at home."""
     found: list[Segment] = []
     frame: Frame = g.ORIGIN
     for k in limb.path:
         body = design.bodies[k]
         placed = body.placed(frame, home=False)
         joint = body.joint
-        if joint is None or k not in limb.joints:
+        mover = k if joint is None or joint.follows is None else joint.follows.body
+        if joint is None or mover not in limb.joints:
             frame = placed if joint is None else body.moved(placed, joint.home)
             continue
         low, high = (-math.pi, math.pi) if joint.continuous else joint.range
-        found.append(Segment(k, placed, joint.axis, low, high))
+        found.append(Segment(k, placed, joint.axis, low, high, joint.slide, joint.follows))
         frame = g.ORIGIN
     tip = g.add(frame[0], g.rotate(frame[1], limb.point))
     return Chain(tuple(found), tip)
@@ -90,9 +142,10 @@ def stretched(design: Design) -> Stretch | None:
         return None
     search = Search(chain(design, arm))
     search.run()
-    angles = dict(zip(arm.joints, search.angles, strict=True))
+    angles = {one.body: a for one, a in zip(search.of, search.angles, strict=True)}
     found = columns(design, arm, frames_at(design, angles))
-    return Stretch(search.reach(), tuple(map(_load, found, search.angles)))
+    loads = tuple(_load(column, angles[column.body]) for column in found)
+    return Stretch(search.reach(), loads)
 
 
 def _load(column: Column, angle: Value) -> Load:
@@ -110,7 +163,7 @@ class Search:
     """
 
     def __init__(self, of: Chain) -> None:
-        self.of, self.n = of.segments, len(of.segments)
+        self.chain, self.of, self.n = of, of.segments, len(of.segments)
         self.angles: list[Value] = [x.low + START * (x.high - x.low) for x in self.of]
         # Tip in the frame of each joint, and that frame in the world, before the joint turns.
         self.tips: list[Vector] = [of.tip] * self.n
@@ -126,6 +179,9 @@ class Search:
 
     def run(self) -> None:
         """Straighten the arm from its tip inwards, stretch it, and turn it to the horizontal."""
+        if len(self.chain.driven) < self.n:
+            self._run_coupled()
+            return
         self._inward(self._straighten)
         self._outward(self._stretch)
         self._inward(self._stretch)
@@ -138,13 +194,61 @@ class Search:
                 break
             before = self.reach()
 
+    def _run_coupled(self) -> None:
+        """Turn one driven joint after the other, with those that follow it, by trial of angles.
+
+        With a joint that others follow the tip does not move on a circle.
+        """
+        driven = self.chain.driven
+        angles = [self.angles[j] for j in driven]
+        for goal in (g.norm, lambda away: hypot(away[0], away[1])):
+            for _ in range(_ROUNDS):
+                for i, j in enumerate(driven):
+                    angles[i] = self._best_of(angles, i, self.of[j], goal)
+        self.angles = self.chain.positions(angles)
+        self._inward()
+        self._outward()
+
+    def _best_of(
+        self, angles: Sequence[Value], i: int, one: Segment, goal: Callable[[Vector], Value]
+    ) -> Value:
+        """Angle of a driven joint at which the tip is furthest away, of angles to try.
+
+        Args:
+            angles: angles of the driven joints.
+            i: place of the joint among them.
+            one: its segment.
+            goal: distance of the tip by its vector from the shoulder.
+        """
+
+        def away(angle: Value) -> Value:
+            return goal(self._to_tip([*angles[:i], angle, *angles[i + 1 :]]))
+
+        low, high, best, before = one.low, one.high, angles[i], away(angles[i])
+        shares = np.linspace(0.0, 1.0, _TRIALS).reshape(-1, *(1 for _ in np.shape(before)))
+        for _ in range(_ZOOMS):
+            tried = low + shares * (high - low)
+            tried, found = np.broadcast_arrays(tried, away(tried))
+            at = np.expand_dims(found.argmax(axis=0), 0)
+            best = np.take_along_axis(tried, at, 0)[0]
+            step = (high - low) / (_TRIALS - 1)
+            low, high = maximum(one.low, best - step), minimum(one.high, best + step)
+        return where(away(best) - before > _TINY * self.length, best, angles[i])
+
+    def _to_tip(self, angles: Sequence[Value]) -> Vector:
+        """Vector from the shoulder to the tip at angles of the driven joints [m]."""
+        frame: Frame = g.ORIGIN
+        for one, position in zip(self.of, self.chain.positions(angles), strict=True):
+            frame = one.frame(frame, position)
+        return g.subtract(g.add(frame[0], g.rotate(frame[1], self.chain.tip)), self.shoulder)
+
     def _inward(self, step: Callable[[int], Value] | None = None) -> None:
         """Take a step for each joint from the last to the first; frames before it are known."""
         for j in reversed(range(self.n)):
             if j < self.n - 1:
                 after = self.of[j + 1]
                 at, rotation = after.place
-                moved = turned(after.axis, self.angles[j + 1], self.tips[j + 1])
+                moved = after.moved(self.angles[j + 1], self.tips[j + 1])
                 self.tips[j] = g.add(at, g.rotate(rotation, moved))
             self._take(step, j)
 

@@ -12,7 +12,7 @@ from draft import geometry as g
 from draft.design import Design
 from draft.design.limbs import limbs
 from draft.metrics.registry import metric
-from draft.metrics.stretch import Chain, chain, turned
+from draft.metrics.stretch import Chain, chain
 from draft.metrics.tips import directions, outer_columns
 from draft.values import Array, Value
 
@@ -36,14 +36,21 @@ def workspace_volume(design: Design) -> Value:
 
     The turn of the first joint is exact; the others take a fixed set of poses, whose error is about
     2 %. Collisions with the floor and of the arm with itself are neglected. 0 for a tip that moves
-    on a line or a plane.
+    on a line or a plane. Not known of an arm in which a joint follows the first one.
     """
     arm = limbs(design).arm
-    if arm is None:
+    if arm is None or follows_first(chain(design, arm)):
         return math.nan
     if directions(outer_columns(design)[0]) < 3:
         return 0.0
     return of_each(design, chain(design, arm), _volume)
+
+
+def follows_first(of: Chain) -> bool:
+    """Whether a joint follows the first one, which then does not turn the rest as a whole."""
+    first, *others = of.segments
+    follows = [one.follows.body for one in others if one.follows is not None]
+    return first.follows is not None or first.body in follows
 
 
 def of_each(design: Design, numbers: T, work: Callable[[T], R]) -> R | Array:
@@ -85,11 +92,15 @@ def spread(count: int, dimensions: int) -> Array:
 
 def _volume(of: Chain) -> float:
     first, *others = of.segments
+    free = [of.segments[j] for j in of.driven[1:]]
+    shares = spread(POSES, len(free))[::-1]
+    drawn = [
+        one.low + share * (one.high - one.low) for one, share in zip(free, shares, strict=True)
+    ]
     tip = of.tip
-    for one, share in zip(others[::-1], spread(POSES, len(others)), strict=True):
-        angle = one.low + share * (one.high - one.low)
+    for one, position in zip(others[::-1], of.positions([0.0, *drawn])[:0:-1], strict=True):
         at, rotation = one.place
-        tip = g.add(at, g.rotate(rotation, turned(one.axis, angle, tip)))
+        tip = g.add(at, g.rotate(rotation, one.moved(position, tip)))
     height = np.broadcast_to(g.dot(first.axis, tip), POSES)
     x, y = _across(first.axis)
     u, v = (np.broadcast_to(g.dot(axis, tip), POSES) for axis in (x, y))

@@ -109,6 +109,7 @@ def layout(root: Element, template: mujoco.MjModel) -> Layout:
     found = _Reader(root, template)
     try:
         found.walk(_child(root, "worldbody"), 0)
+        found.couplings(root)
     except KeyError as error:
         raise _other_topology(str(error.args[0])) from None
     if len(found.geoms) != template.ngeom or found.bodies != template.nbody - 1:
@@ -207,6 +208,17 @@ class _Reader:
             value = a.get(name)
             if value is not None:
                 self.put(of, at, value if isinstance(value, tuple) else (value,))
+
+    def couplings(self, root: Element) -> None:
+        """Joints that follow others."""
+        for section in root.children:
+            for one in section.children if section.tag == "equality" else ():
+                at = self.template.equality(one.attributes["name"]).id
+                start = at * self.template.eq_data.shape[1]
+                polynomial = one.attributes["polycoef"]
+                to, rows = self.plain.setdefault("eq_data", ([], []))
+                to += range(start, start + len(polynomial))
+                rows += self.numbers.places(polynomial)
 
     def geom(self, a: Mapping[str, Any], body: int) -> None:
         """A geom with the defaults of its class."""

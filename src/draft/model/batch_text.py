@@ -27,6 +27,7 @@ FIELDS = (
     *("body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia"),
     *("jnt_pos", "jnt_axis", "jnt_range", "jnt_actfrcrange"),
     *("dof_armature", "dof_damping", "dof_frictionloss", "qpos0", "qpos_spring"),
+    "eq_data",
     *("geom_size", "geom_pos", "geom_quat", "geom_rbound", "geom_aabb", "site_pos", "site_quat"),
 )
 # Those that follow from them by `mj_setConst`.
@@ -41,7 +42,15 @@ _UNUSED = (
 # Attributes that are numbers, and may differ.
 _NUMBERS = {
     "body": ("pos", "quat"),
-    "joint": ("axis", "range", "armature", "damping", "frictionloss", "actuatorfrcrange"),
+    "joint": (
+        "axis",
+        "range",
+        "armature",
+        "damping",
+        "frictionloss",
+        "actuatorfrcrange",
+        "polycoef",
+    ),
     "geom": ("size", "pos", "quat", "density"),
     "site": ("pos",),
     "mesh": ("vertex", "face"),

@@ -39,6 +39,9 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
     servos = root.add("actuator")
     keyframe = root.add("keyframe")
     torque_of = dict(zip(design.joints, _gravity_torques(robot, pose), strict=True))
+    for name, joint in design.joints.items():
+        if (follows := joint.follows) is not None:
+            torque_of[follows.joint] += scalar(follows.ratio) * torque_of[name]
     targets = []
     for name, joint in design.joints.items():
         if joint.actuator is None:

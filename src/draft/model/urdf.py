@@ -76,6 +76,12 @@ def actuators(design: Design) -> dict[str, Any]:
             **({} if joint.rolls else {"range": list(joint.range), "home": joint.home}),
             "class": joint.actuator,
         }
+        if (follows := joint.follows) is not None:
+            entry["follows"] = {
+                "joint": follows.joint,
+                "ratio": follows.ratio,
+                "offset": follows.offset,
+            }
         if joint.actuator is not None:
             a = design.actuators[joint.actuator]
             entry |= {
@@ -178,6 +184,9 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
         effort=scalar(a.peak_torque) if a else 0.0,
         velocity=scalar(a.no_load_speed) if a else _NO_LIMIT,
     )
+    if (follows := joint.follows) is not None:
+        multiplier, offset = scalar(follows.ratio), scalar(follows.offset)
+        element.add("mimic", joint=follows.joint, multiplier=multiplier, offset=offset)
     if a:
         element.add("dynamics", damping=scalar(a.damping), friction=scalar(a.friction_loss))
 

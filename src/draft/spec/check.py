@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, get_args
 
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.laws.quantities import CORNER, QUANTITIES
+from draft.spec.coupling import coupling_problems
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import order
 from draft.spec.payload import KEYS, asks
@@ -45,6 +46,7 @@ def check_spec(spec: Spec) -> None:
         _structure_problems(spec.bodies),
         _supply_problems(spec),
         _fixed_problems(spec),
+        coupling_problems(spec.bodies),
         _allow_problems(spec),
         *(design_problems(spec, design) for design in spec.designs.values()),
     )

@@ -11,17 +11,27 @@ from draft.errors import Location, Problem, SpecError
 from draft.spec.expressions import Expression, Triple, parse
 from draft.spec.field_types import Model
 from draft.spec.primitives.base import End, Written, compile_part, read_axis
+from draft.spec.primitives.basic import CoupledJoint, LinkBase, Member, Motor, Pulley
 from draft.spec.primitives.basic import Joint as JointFields
-from draft.spec.primitives.basic import LinkBase, Member, Motor, Pulley
 from draft.spec.primitives.wheel import WheelJoint
 from draft.spec.reader import Path_, Source
+
+
+@dataclass(frozen=True, slots=True)
+class Coupling:
+    """How a joint follows another one, as written: position = ratio x that of `joint` + offset."""
+
+    joint: str
+    ratio: Expression
+    offset: Expression
+    where: Location
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
     """A joint at the origin of a link, as written: a slide or continuous if true, else a hinge.
 
-    The joint of a wheel has no range.
+    The joint of a wheel has no range, nor has one that follows another joint.
     """
 
     name: str
@@ -33,6 +43,12 @@ class Joint:
     where: Location
     actuator_where: Location
     continuous: bool = False
+    follows: Coupling | None = None
+
+    @property
+    def rolls(self) -> bool:
+        """Whether it is the joint of a wheel."""
+        return self.range is None and self.follows is None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,7 +106,7 @@ def read_link(node: LinkBase, path: Path_, source: Source) -> Link:
     return Link(node.name, joint, member, motor, pulley, node.end, end, where)
 
 
-def _joint(joint: JointFields | WheelJoint, path: Path_, source: Source) -> Joint:
+def _joint(joint: JointFields | CoupledJoint | WheelJoint, path: Path_, source: Source) -> Joint:
     """Compile a joint; a slide cannot have an actuator class, which is rotary."""
     driven, where = source.at((*path, "actuator")), source.at((*path, "name"))
     axis = read_axis(joint.axis, (*path, "axis"), source)
@@ -98,6 +114,14 @@ def _joint(joint: JointFields | WheelJoint, path: Path_, source: Source) -> Join
         zero = parse(0.0, where)
         return Joint(joint.name, False, axis, None, joint.actuator, zero, where, driven, True)
     slide = joint.type == "slide"
+    if isinstance(joint, CoupledJoint):
+        follows, place = joint.follows, (*path, "follows")
+        ratio, offset = (
+            parse(getattr(follows, key), source.at((*place, key))) for key in ("ratio", "offset")
+        )
+        coupling = Coupling(follows.joint, ratio, offset, source.at((*place, "joint")))
+        home = parse(0.0, where)
+        return Joint(joint.name, slide, axis, None, None, home, where, driven, follows=coupling)
     if slide and joint.actuator is not None:
         cause = (
             f"joint '{joint.name}' is a slide, and '{joint.actuator}' is a rotary actuator class"

@@ -18,7 +18,9 @@ NAME_RULE = "a name has letters, digits and _, no digit first, and at most 64 of
 # Types of the root of a tree.
 ROOTS = ("root", "fixed")
 _RANGE = ("joint", "range")
-ONLY_WHEELS = "; only the joint of a link of 'type: wheel' has none"
+ONLY_WHEELS = (
+    "; only the joint of a link of 'type: wheel', and one that 'follows' another, have none"
+)
 _KEY = "[key]"  # pydantic's last step where a mapping's key is wrong, not its value
 _MAPPING = "expected a mapping of keys and values"
 

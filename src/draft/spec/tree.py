@@ -16,6 +16,7 @@ from draft.spec.expressions import Triple, parse
 from draft.spec.field_types import Model
 from draft.spec.links import Joint, Link, read_link
 from draft.spec.primitives.base import Written, compile_part, read_triple
+from draft.spec.primitives.basic import CoupledJoint
 from draft.spec.primitives.fixed import FixedBase, PedestalPart
 from draft.spec.primitives.wheel import WheelJoint
 from draft.spec.reader import Path_, Source
@@ -253,7 +254,8 @@ def _changed_joint(joint: Joint | None, changes: _Changes, source: Source) -> Jo
     """Joint with the range, home position and axis of one use of its chain.
 
     Raises:
-        SpecError: the range or home of a wheel's joint is to change, which has none.
+        SpecError: the range or home of a joint is to change that has none: that of a wheel, or one
+            that follows another.
     """
     if joint is None:
         return None
@@ -261,8 +263,11 @@ def _changed_joint(joint: Joint | None, changes: _Changes, source: Source) -> Jo
     if joint.range is None and (turned := change.model_fields_set - {"reverse"}):
         key = min(turned)
         where = source.at((*path, key), key=True)
-        cause = f"joint '{joint.name}' of a wheel has no '{key}' to change"
-        raise SpecError(Problem(cause, where, WheelJoint.absent[key]))
+        kind, remedies = "of a wheel", WheelJoint.absent
+        if joint.follows is not None:
+            kind, remedies = f"follows '{joint.follows.joint}' and", CoupledJoint.absent
+        cause = f"joint '{joint.name}' {kind} has no '{key}' to change"
+        raise SpecError(Problem(cause, where, remedies[key]))
     if change.range is not None:
         low, high = (
             parse(value, source.at((*path, "range", i))) for i, value in enumerate(change.range)

@@ -63,6 +63,8 @@ def topology(design: Design) -> tuple[str, list[Chain]]:
         cause = f"{name} cannot be trained: a policy walks, and its base is fixed to the world"
         raise DraftError(cause, "name a robot on legs")
     for joint, one in design.joints.items():
+        if one.follows is not None:
+            raise _untrainable(name, f"its joint {joint} follows {one.follows.joint}")
         if one.actuator is None:
             raise _untrainable(name, f"its joint {joint} has no actuator")
         if one.rolls:

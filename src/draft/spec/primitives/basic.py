@@ -5,10 +5,10 @@ The other primitives add an end at the tip of the link.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, get_args
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from draft import geometry as g
 from draft.geometry import Vector
@@ -58,6 +58,53 @@ class Joint(Model):
     """Actuator class that drives it. Omit it for a passive joint, and for a slide."""
     home: Number = 0.0
     """Angle [rad], or position of a slide [m], in the home pose."""
+
+
+class Follows(Model):
+    """Motion of a coupled joint: its position is ratio times that of another joint plus offset."""
+
+    joint: Name
+    """Joint that it follows: a name in its chain, or else a full name with its prefix."""
+    ratio: Number
+    """Motion per motion of that joint: positive for the same sense about each joint's own axis.
+    [1]; m/rad for a slide that follows a hinge."""
+    offset: Number = 0.0
+    """Position where the other joint is at zero [rad]; of a slide [m]."""
+
+
+_OF_LEADER = "that of the joint that it follows: remove it"
+
+
+class CoupledJoint(Model):
+    """A joint that follows another one by a fixed ratio, as the last joint of many fingers does.
+
+    Its range and its position in the home pose follow from those of the other joint.
+    """
+
+    absent: ClassVar[Mapping[str, str]] = {
+        "range": f"its range follows from {_OF_LEADER}",
+        "home": f"its home position follows from {_OF_LEADER}",
+        "actuator": "a joint that follows another has no drive of its own: remove it",
+    }
+
+    name: Name
+    """Name, after the prefix of the chain."""
+    type: Literal["hinge", "slide"] = "hinge"
+    """Rotation about the axis, or translation along it."""
+    axis: Axis
+    """Axis of positive rotation, or direction of positive motion, in the link's frame."""
+    follows: Follows
+    """The joint that it follows, and how."""
+
+
+def _joint_kind(value: object) -> str:
+    return "(follows)" if isinstance(value, dict) and "follows" in value else "(free)"
+
+
+AnyJoint = Annotated[
+    Annotated[Joint, Tag("(free)")] | Annotated[CoupledJoint, Tag("(follows)")],
+    Discriminator(_joint_kind),
+]
 
 
 class Member(Model):
@@ -223,7 +270,7 @@ class LinkBase(Model):
     """Origin in the frame of the parent [m]. Default: the tip of the parent."""
     rpy: NumberVector | None = None
     """Roll, pitch, yaw in the frame of the parent [rad], as in URDF."""
-    joint: Joint | None = None
+    joint: AnyJoint | None = None
     """Joint at its origin. Without one the link is fixed to its parent."""
     link: Member | None = None
     """Structural member."""
