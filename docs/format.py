@@ -60,6 +60,19 @@ states it is what the trends give without such values of the class.
   the left. `joints` changes the range, the home position or the direction of motion of a joint of
   one copy.
 - A joint of `type: slide` moves its link along its axis, in metres. It has no actuator.
+- A joint that `follows` another moves with it by a fixed ratio, as the last joint of many fingers
+  does: it has no `range`, no `home` and no actuator of its own. MJCF holds the two together by an
+  equality, URDF by `mimic`. `ratio` counts each motion about its own axis.
+
+      joint: {name: bend_3, axis: y, follows: {joint: bend_2, ratio: 0.9}}
+
+- A `transmission` is between an actuator and its joint: torque grows by the ratio and the
+  efficiency, speed falls by the ratio, and the inertia of the rotor grows by its square. The
+  actuator may be anywhere between the base and the joint: `motor` names its link.
+
+      joint: {name: bend_1, axis: y, range: [0, 1.6], actuator: servo,
+              transmission: {motor: palm_servo_1, ratio: 1.5, efficiency: 0.8}}
+
 - The joint of a link of `type: wheel` turns without end: it has no `type`, no `range` and no
   `home`. With an actuator it is driven: a servo holds its speed, where those of other joints hold
   their angles. Without one it rolls freely, as a caster.

@@ -408,6 +408,7 @@ def test_what_follows_from_the_other_joint_is_not_stated(
 def test_a_joint_that_follows_no_joint_is_refused() -> None:
     found = refusal("joint: {name: distal, axis: y, follows: {joint: proximl, ratio: 1}}")
     assert found[0] == "joint 'index_distal' follows 'proximl', which does not exist"
+    assert found[1].startswith("did you mean 'proximal'?")
 
 
 def test_a_joint_that_follows_itself_is_refused() -> None:

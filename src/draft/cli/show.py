@@ -85,6 +85,7 @@ def _label(design: Design, index: int, mass: object) -> Text:
         low, high = body.joint.range
         span = f"{low:g}..{high:g} {unit.get(body.joint.kind, 'rad')}"
         span = "rolls" if body.joint.rolls else span
+        span += f", {body.joint.moved_by}" if body.joint.moved_by else ""
         text.append(f"  {body.joint.name} ({axis}) {span}", style="cyan")
     if body.actuator is not None:
         text.append(f"  [{body.actuator.name}]", style="magenta")

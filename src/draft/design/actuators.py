@@ -124,6 +124,30 @@ class Actuator(Quantities):
         surface = 2.0 * PI * self.radius * (self.radius + self.length)
         return copper_loss(*line, self.rated_torque, surface)
 
+    def through(self, ratio: Value, efficiency: Value) -> Actuator:
+        """The actuator as a joint sees it behind a transmission.
+
+        Torques grow by ratio and efficiency, speeds fall by the ratio, and inertia and viscous
+        friction grow by its square. The weight of the module is where it is.
+
+        Args:
+            ratio: turns of the output per turn of the joint.
+            efficiency: share of the torque that arrives.
+        """
+        gain = ratio * efficiency
+        return replace(
+            self,
+            peak_torque=self.peak_torque * gain,
+            rated_torque=self.rated_torque * gain,
+            no_load_speed=self.no_load_speed / ratio,
+            corner_speed=self.corner_speed / ratio,
+            gear_ratio=self.gear_ratio * ratio,
+            peak_power=self.peak_power * efficiency,
+            armature=self.armature * ratio * ratio,
+            friction_loss=self.friction_loss * ratio,
+            damping=self.damping * ratio * ratio,
+        )
+
     def available(self, speed: Value) -> Value:
         """Torque available at a speed in the direction of the torque [N m]; zero or more.
 

@@ -397,6 +397,13 @@ class Design:
             if body.joint is not None
         }
 
+    def drive(self, joint: Joint) -> Actuator | None:
+        """Actuator of a joint as the joint sees it, behind its transmission; None without one."""
+        if joint.actuator is None:
+            return None
+        actuator = self.actuators[joint.actuator]
+        return actuator.through(*joint.transmission) if joint.transmission else actuator
+
     def body_masses(self) -> dict[str, Value]:
         """Mass of every body [kg]."""
         masses = {body.name: body.mass for body in self.bodies}

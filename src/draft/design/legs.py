@@ -216,7 +216,7 @@ def _joints(
             LegJoint(
                 body=k,
                 names=tuple(bodies[other[place]].prefix + joint.name for other in runs),
-                actuator=design.actuators[joint.actuator] if joint.actuator else None,
+                actuator=design.drive(joint),
                 angle=angles.get(k, 0.0),
                 lift=axis[0] * r[1] - axis[1] * r[0],
                 sweep=axis[1] * r[2] - axis[2] * r[1],
@@ -243,7 +243,7 @@ def held_joints(design: Design) -> tuple[LegJoint, ...]:
         LegJoint(
             body=k,
             names=(body.prefix + joint.name,),
-            actuator=design.actuators[joint.actuator] if joint.actuator else None,
+            actuator=design.drive(joint),
             angle=joint.home,
             lift=0.0,
             sweep=0.0,

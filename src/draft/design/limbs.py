@@ -189,7 +189,8 @@ def columns(design: Design, limb: Limb, frames: Mapping[int, Frame]) -> tuple[Co
     found = []
     for k in limb.joints:
         joint = design.bodies[k].joint
-        if joint is None or joint.actuator is None:
+        actuator = None if joint is None else design.drive(joint)
+        if joint is None or actuator is None:
             continue
         axis, arm = g.rotate(frames[k][1], joint.axis), motion(design, k, frames, tip)
         for i in limb.path:
@@ -204,7 +205,7 @@ def columns(design: Design, limb: Limb, frames: Mapping[int, Frame]) -> tuple[Co
             Column(
                 body=k,
                 name=design.bodies[k].prefix + joint.name,
-                actuator=design.actuators[joint.actuator],
+                actuator=actuator,
                 axis=axis,
                 arm=arm,
                 torque=hangs[k],

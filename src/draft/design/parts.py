@@ -15,7 +15,7 @@ from draft.spec.primitives.base import End
 from draft.spec.primitives.basic import MemberPart, MotorPart, PulleyPart
 from draft.spec.primitives.wheel import WheelPart
 from draft.spec.tree import UNMIRRORED, Signs
-from draft.values import Value, is_array, maximum, minimum
+from draft.values import Value, is_array, maximum, minimum, scalar
 
 TURN = (-math.pi, math.pi)  # Angles of a wheel that sliders and poses have [rad].
 _ALONG = 1e-6
@@ -41,6 +41,27 @@ class Coupling(NamedTuple):
         return self.ratio * position + self.offset
 
 
+class Transmission(NamedTuple):
+    """What is between an actuator and its joint.
+
+    Attributes:
+        ratio: turns of the actuator's output per turn of the joint.
+        efficiency: share of the actuator's torque that arrives.
+    """
+
+    ratio: Value
+    efficiency: Value
+
+    @classmethod
+    def read(cls, written: links.Transmission, joint: str, r: Evaluator) -> Transmission:
+        """Evaluate ratio and efficiency."""
+        ratio = r.positive(written.ratio, f"ratio of {joint}")
+        what = f"efficiency of {joint}"
+        efficiency = r.positive(written.efficiency, what)
+        r.require(efficiency <= 1, written.efficiency, what, efficiency, "must be at most 1")
+        return cls(ratio, efficiency)
+
+
 class Joint(NamedTuple):
     """A hinge or a slide: unit axis in the frame of the link; range and home [rad or m].
 
@@ -57,11 +78,25 @@ class Joint(NamedTuple):
     continuous: bool = False
     rolls: bool = False
     follows: Coupling | None = None
+    transmission: Transmission | None = None
 
     @property
     def kind(self) -> str:
         """Type of the joint as URDF calls it."""
         return "prismatic" if self.slide else "continuous" if self.continuous else "revolute"
+
+    @property
+    def moved_by(self) -> str:
+        """Joint that it follows, or transmission, in words; "" for neither. Of a single design."""
+        if self.follows is not None:
+            offset = scalar(self.follows.offset)
+            plus = f" {offset:+.3g}" if offset else ""
+            return f"follows {self.follows.joint} x {scalar(self.follows.ratio):.3g}{plus}"
+        if self.transmission is not None:
+            ratio, efficiency = map(scalar, self.transmission)
+            lossy = f" at {efficiency:.0%}" if efficiency < 1 else ""
+            return f"through {ratio:.3g}:1{lossy}"
+        return ""
 
 
 class Link(NamedTuple):
@@ -199,6 +234,7 @@ def _mirrored_joint(joint: Joint, signs: Signs) -> Joint:
 
 def _joint(joint: links.Joint, r: Evaluator) -> Joint:
     axis = r.axis(joint.axis, joint.name)
+    transmission = joint.transmission and Transmission.read(joint.transmission, joint.name, r)
     if joint.follows is not None:
         what = f"ratio of {joint.name}"
         ratio = r.number(joint.follows.ratio, what)
@@ -207,7 +243,8 @@ def _joint(joint: links.Joint, r: Evaluator) -> Joint:
         follows = Coupling(ratio, r.number(joint.follows.offset, f"offset of {joint.name}"))
         return Joint(joint.name, joint.slide, axis, TURN, 0.0, None, follows=follows)
     if joint.range is None:
-        return Joint(joint.name, False, axis, TURN, 0.0, joint.actuator, True, True)
+        driver = joint.actuator
+        return Joint(joint.name, False, axis, TURN, 0.0, driver, True, True, None, transmission)
     low = r.number(joint.range[0], f"range of {joint.name}")
     high = r.number(joint.range[1], f"range of {joint.name}")
     r.require(
@@ -223,5 +260,13 @@ def _joint(joint: links.Joint, r: Evaluator) -> Joint:
     limits = "" if is_array(low) or is_array(high) else f" [{low:g}, {high:g}]"
     rule = f"must lie in the joint's range{limits}"
     r.require(inside, joint.home, what, home, rule)
-    span = (low, high)
-    return Joint(joint.name, joint.slide, axis, span, home, joint.actuator, joint.continuous)
+    return Joint(
+        joint.name,
+        joint.slide,
+        axis,
+        (low, high),
+        home,
+        joint.actuator,
+        joint.continuous,
+        transmission=transmission,
+    )

@@ -67,9 +67,8 @@ def grasps(design: Design) -> Grasp:
     """Grasps of a design; zeros without two tips that oppose each other."""
     fingers = []
     for limb in limbs(design).fingers:
-        joints = [design.bodies[k].joint for k in limb.joints]
-        names = [joint.actuator for joint in joints if joint is not None and joint.actuator]
-        torques = tuple(design.actuators[name].peak_torque for name in names)
+        joints = [joint for k in limb.joints if (joint := design.bodies[k].joint) is not None]
+        torques = tuple(a.peak_torque for a in map(design.drive, joints) if a is not None)
         fingers.append(_Finger(chain(design, limb), limb.radius, torques))
     found = of_each(design, tuple(fingers), _grasps)
     return Grasp(*(found.T if isinstance(found, np.ndarray) else found))

@@ -43,9 +43,10 @@ class Driven(NamedTuple):
 def driven_wheels(design: Design) -> list[Driven]:
     """Driven wheels that a robot stands on, in the order of the tree."""
     return [
-        Driven(body.prefix + joint.name, design.actuators[joint.actuator], end.radius)
+        Driven(body.prefix + joint.name, actuator, end.radius)
         for body in (design.bodies[i] for i in design.feet)
-        if (joint := body.joint) is not None and joint.actuator is not None and joint.rolls
+        if (joint := body.joint) is not None and joint.rolls
+        if (actuator := design.drive(joint)) is not None
         if isinstance(end := body.link.end, WheelPart)
     ]
 

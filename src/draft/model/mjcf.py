@@ -138,8 +138,7 @@ def _robot(design: Design, brackets: Sequence[Element]) -> Element:
             element.children += [*brackets, *_parts(body)]
             world.children.append(element)
         else:
-            driven = None if body.joint is None else body.joint.actuator
-            actuator = None if driven is None else design.actuators[driven]
+            actuator = None if body.joint is None else design.drive(body.joint)
             made = reuse.result(("element", i), _body, body, actuator)
             element = made.alone()
             element.children += made.children

@@ -44,9 +44,8 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
             torque_of[follows.joint] += scalar(follows.ratio) * torque_of[name]
     targets = []
     for name, joint in design.joints.items():
-        if joint.actuator is None:
+        if (actuator := design.drive(joint)) is None:
             continue
-        actuator = design.actuators[joint.actuator]
         peak, speed = scalar(actuator.peak_torque), scalar(actuator.no_load_speed)
         stall = (scalar(actuator.stall_torque),) if actuator.has_corner else ()
         custom.add("numeric", name=f"{name}_dc_motor", data=(peak, speed, *stall))

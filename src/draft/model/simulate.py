@@ -254,14 +254,14 @@ def _driven(design: Design, scene: mujoco.MjModel, course: Course) -> Iterator[_
         if (joint := body.joint) is None:
             continue
         index += 1
-        if joint.actuator is None:
+        if (actuator := design.drive(joint)) is None:
             continue
         servo += 1
         yield _Servo(
             body.prefix + joint.name,
             body.name,
             joint,
-            design.actuators[joint.actuator],
+            actuator,
             course.joints[:, index] - home[index],
             float(np.max(np.abs(course.speeds[-1:, index]), initial=0.0)),
             float(course.at_limit[servo]),

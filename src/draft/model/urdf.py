@@ -30,9 +30,10 @@ TRUNK = "meshes/trunk.stl"
 # URDF requires a velocity limit, also for a joint without an actuator [rad/s or m/s].
 _NO_LIMIT = 1000.0
 _GIMBAL = 1e-9
-# Torque over speed of an actuator that drives its joint, in the table of the actuators.
 # Quantities of a module that its joint has under another name, or does not show.
 _OF_MODULE = ("aspect_ratio", "mass", "volume", "radius", "length", "rotor_inertia")
+_FOLLOWS = ("joint", "ratio", "offset")  # What is told of a joint that follows another.
+# Torque over speed of an actuator that drives its joint, in the table of the actuators.
 _LINE = "available = peak_torque * (1 - |speed| / no_load_speed) when driving"
 _CORNERED = (
     "available = min(peak_torque, stall_torque * (1 - |speed| / no_load_speed)) when driving; "
@@ -77,13 +78,10 @@ def actuators(design: Design) -> dict[str, Any]:
             "class": joint.actuator,
         }
         if (follows := joint.follows) is not None:
-            entry["follows"] = {
-                "joint": follows.joint,
-                "ratio": follows.ratio,
-                "offset": follows.offset,
-            }
-        if joint.actuator is not None:
-            a = design.actuators[joint.actuator]
+            entry["follows"] = {name: getattr(follows, name) for name in _FOLLOWS}
+        if (transmission := joint.transmission) is not None:
+            entry["transmission"] = transmission._asdict()
+        if (a := design.drive(joint)) is not None:
             entry |= {
                 "like": a.like,
                 **{name: getattr(a, name) for name in a.quantities if name not in _OF_MODULE},
@@ -176,7 +174,7 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
         return
     hinge = compiled.joint(name)
     element.add("axis", xyz=hinge.axis)
-    a = design.actuators[joint.actuator] if joint.actuator is not None else None
+    a = design.drive(joint)
     element.add(
         "limit",
         lower=None if joint.continuous else float(hinge.range[0]),

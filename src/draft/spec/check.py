@@ -11,6 +11,7 @@ from draft.laws.quantities import CORNER, QUANTITIES
 from draft.spec.coupling import coupling_problems
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import order
+from draft.spec.links import Joint
 from draft.spec.payload import KEYS, asks
 from draft.spec.primitives.basic import Segment
 from draft.spec.primitives.foot import PlatePart
@@ -123,22 +124,43 @@ def key_problem(spec: Spec, key: str, where: Location | None) -> Problem | None:
 def drives(spec: Spec) -> dict[int, int]:
     """Map the body index of each motor to the body index of the joint that it drives.
 
-    A joint is driven by the nearest motor of its class above it that does not drive another joint.
+    A joint is driven by the motor that its transmission names; others by the nearest motor of their
+    class above them that does not drive another joint.
     """
     taken: dict[int, int] = {}
-    for index, body in enumerate(spec.bodies):
-        joint = body.link.joint
-        if joint is None or joint.actuator is None:
-            continue
-        above = body.parent
-        while above is not None:
-            motor = spec.bodies[above].link.motor
-            same = motor is not None and motor.fields.actuator == joint.actuator
-            if same and above not in taken:
-                taken[above] = index
-                break
-            above = spec.bodies[above].parent
+    bodies = spec.bodies
+    for named in (True, False):
+        for index, body in enumerate(bodies):
+            joint = body.link.joint
+            if joint is None or joint.actuator is None or bool(motor_link(joint)) != named:
+                continue
+            for above in _above(spec, index):
+                motor = bodies[above].link.motor
+                same = motor is not None and motor.fields.actuator == joint.actuator
+                here = not named or above == _named(spec, body, motor_link(joint))
+                if same and here and above not in taken:
+                    taken[above] = index
+                    break
     return taken
+
+
+def motor_link(joint: Joint) -> str:
+    """Link that the transmission of a joint names as that of its motor; "" for none."""
+    return (joint.transmission and joint.transmission.motor) or ""
+
+
+def _above(spec: Spec, body: int) -> Iterator[int]:
+    """Bodies from the parent of one to the base."""
+    above = spec.bodies[body].parent
+    while above is not None:
+        yield above
+        above = spec.bodies[above].parent
+
+
+def _named(spec: Spec, body: Body, link: str) -> int | None:
+    """Body of a link that a link of a chain names: one of its chain, else one of that full name."""
+    names = {other.name: i for i, other in enumerate(spec.bodies)}
+    return names.get(body.prefix + link, names.get(link))
 
 
 def _supply_problems(spec: Spec) -> Iterator[Problem]:
@@ -338,20 +360,54 @@ def _allow_problems(spec: Spec) -> Iterator[Problem]:
 
 
 def _motor_problems(spec: Spec) -> Iterator[Problem]:
-    """Motors without a joint, and joints without a motor."""
+    """Transmissions whose motor cannot drive; else motors without a joint, and joints without."""
     pairs = drives(spec)
-    driven = set(pairs.values())
+    idle = {
+        index: joint
+        for index, body in enumerate(spec.bodies)
+        if (joint := body.link.joint) is not None
+        and joint.actuator is not None
+        and index not in pairs.values()
+    }
+    remote = {index: joint for index, joint in idle.items() if motor_link(joint)}
+    if remote:
+        yield from (_remote_problem(spec, index, joint) for index, joint in remote.items())
+        return
     for index, body in enumerate(spec.bodies):
-        joint, motor = body.link.joint, body.link.motor
+        motor = body.link.motor
         if motor is not None and index not in pairs:
             yield Problem(
                 f"the motor on '{body.name}' drives no joint",
                 motor.places["actuator"],
                 f"the next joint down the tree must use actuator '{motor.fields.actuator}'",
             )
-        if joint is not None and joint.actuator is not None and index not in driven:
+        if (joint := idle.get(index)) is not None:
             yield Problem(
                 f"no motor drives joint '{body.prefix}{joint.name}'",
                 joint.actuator_where,
                 f"put 'motor: {{actuator: {joint.actuator}, axis: ...}}' on a link above it",
             )
+
+
+def _remote_problem(spec: Spec, index: int, joint: Joint) -> Problem:
+    """Problem of the joint of a body whose transmission names a link that cannot drive it."""
+    body, link = spec.bodies[index], motor_link(joint)
+    where = joint.where if joint.transmission is None else joint.transmission.where
+    what, at = f"joint '{body.prefix}{joint.name}'", _named(spec, body, link)
+    way = [spec.bodies[i].name for i in _above(spec, index)]
+    if at is None:
+        near = [name.removeprefix(body.prefix) for name in way]
+        remedy = suggest(link, near, "links between the base and the joint")
+        return Problem(f"the motor of {what} is on '{link}', which does not exist", where, remedy)
+    name = spec.bodies[at].name
+    if name not in way:
+        cause = f"the motor of {what} is on '{name}', which is not between it and the base"
+        return Problem(cause, where, f"name one of {', '.join(way[::-1])}")
+    motor = spec.bodies[at].link.motor
+    if motor is None or motor.fields.actuator != joint.actuator:
+        cause = f"the motor of {what} is on '{name}', which has no motor of '{joint.actuator}'"
+        return Problem(
+            cause, where, f"add 'motor: {{actuator: {joint.actuator}, axis: ...}}' to it"
+        )
+    cause = f"the motor on '{name}' is to drive {what} and another joint"
+    return Problem(cause, where, "give each joint a motor, or let one joint follow the other")

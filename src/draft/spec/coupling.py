@@ -34,7 +34,8 @@ def coupling_problems(bodies: Sequence[Body]) -> Iterator[Problem]:
         leader = _leader(body, coupling, names)
         if leader < 0:
             cause = f"{own} follows '{coupling.joint}', which does not exist"
-            remedy = suggest(coupling.joint, [n for n in names if n != _full(body)], "joints")
+            near = [name.removeprefix(body.prefix) for name in names if name != _full(body)]
+            remedy = suggest(coupling.joint, near, "joints")
             yield Problem(cause, coupling.where, remedy)
         elif (joint := bodies[leader].link.joint) is not None and joint.rolls:
             cause = f"{own} follows '{_full(bodies[leader])}', the joint of a wheel"

@@ -28,6 +28,16 @@ class Coupling:
 
 
 @dataclass(frozen=True, slots=True)
+class Transmission:
+    """Ratio and efficiency between an actuator and its joint, as written, and the motor's link."""
+
+    motor: str | None
+    ratio: Expression
+    efficiency: Expression
+    where: Location
+
+
+@dataclass(frozen=True, slots=True)
 class Joint:
     """A joint at the origin of a link, as written: a slide or continuous if true, else a hinge.
 
@@ -44,6 +54,7 @@ class Joint:
     actuator_where: Location
     continuous: bool = False
     follows: Coupling | None = None
+    transmission: Transmission | None = None
 
     @property
     def rolls(self) -> bool:
@@ -89,7 +100,7 @@ def read_link(node: LinkBase, path: Path_, source: Source) -> Link:
     """Compile the expressions of one link.
 
     Raises:
-        SpecError: an actuator class is to drive a slide.
+        SpecError: an actuator class is to drive a slide, or a joint without one has a transmission.
     """
     joint = member = motor = pulley = end = None
     if node.joint is not None:
@@ -111,8 +122,19 @@ def _joint(joint: JointFields | CoupledJoint | WheelJoint, path: Path_, source: 
     driven, where = source.at((*path, "actuator")), source.at((*path, "name"))
     axis = read_axis(joint.axis, (*path, "axis"), source)
     if isinstance(joint, WheelJoint):
-        zero = parse(0.0, where)
-        return Joint(joint.name, False, axis, None, joint.actuator, zero, where, driven, True)
+        zero, transmission = parse(0.0, where), _transmission(joint, path, source)
+        return Joint(
+            joint.name,
+            False,
+            axis,
+            None,
+            joint.actuator,
+            zero,
+            where,
+            driven,
+            True,
+            transmission=transmission,
+        )
     slide = joint.type == "slide"
     if isinstance(joint, CoupledJoint):
         follows, place = joint.follows, (*path, "follows")
@@ -140,4 +162,21 @@ def _joint(joint: JointFields | CoupledJoint | WheelJoint, path: Path_, source: 
         where,
         driven,
         joint.type == "continuous",
+        transmission=_transmission(joint, path, source),
     )
+
+
+def _transmission(
+    joint: JointFields | WheelJoint, path: Path_, source: Source
+) -> Transmission | None:
+    """Compile a transmission, which only a driven joint has."""
+    written, path = joint.transmission, (*path, "transmission")
+    if written is None:
+        return None
+    if joint.actuator is None:
+        cause = f"joint '{joint.name}' has a transmission and no actuator"
+        raise SpecError(Problem(cause, source.at(path), "add 'actuator: ...', or remove it"))
+    ratio, efficiency = (
+        parse(getattr(written, key), source.at((*path, key))) for key in ("ratio", "efficiency")
+    )
+    return Transmission(written.motor, ratio, efficiency, source.at((*path, "motor")))

@@ -60,10 +60,11 @@ def link(design: Design, body: int) -> str:
         low, high = (scalar(end) for end in joint.range)
         unit = "m" if joint.slide else "rad"
         span = "rolls" if joint.rolls else f"{low:.2f} to {high:.2f} {unit}"
+        span += f", {joint.moved_by}" if joint.moved_by else ""
         rows.append(("joint", f"{one.prefix + one.joint.name}, {span}"))
         places.add(one.prefix + one.joint.name)
     for what, actuator in (
-        ("driven by", design.actuators.get(str(joint.actuator)) if joint else None),
+        ("driven by", design.drive(joint) if joint else None),
         ("carries", one.actuator),
     ):
         if actuator is None:

@@ -349,8 +349,8 @@ def _height(model: Model, home: Sequence[float], geoms: Sequence[str]) -> float:
 def _of_actuators(design: Design, number: str) -> tuple[float, ...]:
     """Attribute of the actuator of each joint, by name."""
     return tuple(
-        float(getattr(design.actuators[joint.actuator], number)) if joint.actuator else math.nan
-        for joint in design.joints.values()
+        math.nan if motor is None else float(getattr(motor, number))
+        for motor in map(design.drive, design.joints.values())
     )
 
 

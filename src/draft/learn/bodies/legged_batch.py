@@ -83,7 +83,8 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
     except DraftError:
         return {}
     rows = batch.rows
-    motors = [design.actuators[design.joints[name].actuator or ""] for name in first.joints]
+    drives = [design.drive(design.joints[name]) for name in first.joints]
+    motors = [motor for motor in drives if motor is not None]
     columns = {
         "text": robot_texts(design, rows),
         "home": _tuples(home[rows]),

@@ -228,17 +228,19 @@ def _rubbing(region: Region, design: Design) -> Iterator[Departure]:
     """Friction of the joint with most of it, if that is far beyond that of the training."""
     joint, share = max(_frictions(design).items(), key=lambda one: one[1])
     if share > _FAR * region.friction:
-        peak = scalar(design.actuators[str(design.joints[joint].actuator)].peak_torque)
+        motor = design.drive(design.joints[joint])
+        peak = 0.0 if motor is None else scalar(motor.peak_torque)
         known = region.friction * peak
         yield Departure(f"friction of {joint}", share * peak, known, known, "N m")
 
 
 def _frictions(design: Design) -> dict[str, float]:
     """Friction loss, and damping at the no-load speed, over the peak torque, by joint."""
-    motors = {name: design.actuators[str(one.actuator)] for name, one in design.joints.items()}
+    motors = {name: design.drive(joint) for name, joint in design.joints.items()}
     return {
         name: scalar((a.friction_loss + a.damping * a.no_load_speed) / a.peak_torque)
         for name, a in motors.items()
+        if a is not None
     }
 
 

@@ -39,6 +39,18 @@ Segment = Literal[
 ]
 
 
+class Transmission(Model):
+    """What is between an actuator and its joint: a belt, a tendon over pulleys, a linkage."""
+
+    motor: Name | None = None
+    """Link of the actuator, a name in its chain or a full name with its prefix: it is between the
+    base and the joint. Default: the nearest one of the class that drives no other joint."""
+    ratio: Number = 1.0
+    """Turns of the actuator's output per turn of the joint: torque grows with it, speed falls."""
+    efficiency: Number = 1.0
+    """Share of the actuator's torque that arrives, above 0 and at most 1."""
+
+
 class Joint(Model):
     """A hinge or a slide at the link's origin.
 
@@ -56,6 +68,8 @@ class Joint(Model):
     its range is the one that poses are sampled from."""
     actuator: Name | None = None
     """Actuator class that drives it. Omit it for a passive joint, and for a slide."""
+    transmission: Transmission | None = None
+    """Ratio between the actuator and the joint, and where the actuator is."""
     home: Number = 0.0
     """Angle [rad], or position of a slide [m], in the home pose."""
 

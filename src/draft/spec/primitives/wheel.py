@@ -21,7 +21,7 @@ from draft.spec.primitives.base import (
     check_mass_or_density,
     stated_mass,
 )
-from draft.spec.primitives.basic import LinkBase
+from draft.spec.primitives.basic import LinkBase, Transmission
 from draft.values import Value
 
 _ENDLESS = "a wheel turns without end: remove it"
@@ -45,6 +45,8 @@ class WheelJoint(Model):
     """Axis of positive rotation in the link's frame, along that of the wheel."""
     actuator: Name | None = None
     """Actuator class that drives it. Omit it for a passive wheel, such as a caster."""
+    transmission: Transmission | None = None
+    """Ratio between the actuator and the wheel, and where the actuator is."""
 
 
 class Wheel(Model):
