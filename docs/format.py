@@ -64,14 +64,14 @@ states it is what the trends give without such values of the class.
   does: it has no `range`, no `home` and no actuator of its own. MJCF holds the two together by an
   equality, URDF by `mimic`. `ratio` counts each motion about its own axis.
 
-      joint: {name: bend_3, axis: y, follows: {joint: bend_2, ratio: 0.9}}
+      joint: {{name: bend_3, axis: y, follows: {{joint: bend_2, ratio: 0.9}}}}
 
 - A `transmission` is between an actuator and its joint: torque grows by the ratio and the
   efficiency, speed falls by the ratio, and the inertia of the rotor grows by its square. The
   actuator may be anywhere between the base and the joint: `motor` names its link.
 
-      joint: {name: bend_1, axis: y, range: [0, 1.6], actuator: servo,
-              transmission: {motor: palm_servo_1, ratio: 1.5, efficiency: 0.8}}
+      joint: {{name: bend_1, axis: y, range: [0, 1.6], actuator: servo,
+              transmission: {{motor: palm_servo_1, ratio: 1.5, efficiency: 0.8}}}}
 
 - The joint of a link of `type: wheel` turns without end: it has no `type`, no `range` and no
   `home`. With an actuator it is driven: a servo holds its speed, where those of other joints hold
