@@ -107,6 +107,8 @@ class Joint:
         where: its place in the file.
         anchor: point of the axis in the child frame [m]; zero in a URDF.
         mimics: name of the joint it follows.
+        ratio: motion per motion of that joint; 0 if the file couples them otherwise.
+        offset: position with that joint at zero [rad or m].
         rest: position without a drive [rad or m], before the limits are applied: zero in a URDF;
             in MJCF that of its spring, else that in which the file shows the joint.
         driven: whether it may have an actuator. False in an MJCF model whose actuators drive only
@@ -126,6 +128,8 @@ class Joint:
     where: Location
     anchor: Point = (0.0, 0.0, 0.0)
     mimics: str | None = None
+    ratio: float = 1.0
+    offset: float = 0.0
     rest: float = 0.0
     driven: bool = True
 

@@ -44,6 +44,7 @@ def followed(root: Element, joints: Mapping[str, Joint]) -> dict[str, Joint]:
     """Joints, with `mimics` set for those that an equality couples to another.
 
     Of two coupled joints the one without an actuator follows; joint1 if both or neither have one.
+    A polynomial that is no line, or between joints that do not rest at zero, has a ratio of 0.
     """
     coupled = dict(joints)
     for section in root.all("equality"):
@@ -52,8 +53,12 @@ def followed(root: Element, joints: Mapping[str, Joint]) -> dict[str, Joint]:
             if element.attributes.get("active") == "false" or not set(pair) <= set(coupled):
                 continue
             first, second = coupled[pair[0]], coupled[pair[1]]
+            offset, ratio, *curved = element.some_numbers("polycoef") or (0.0, 1.0)
+            if any(curved) or first.rest or second.rest:
+                ratio = 0.0
             if first.driven and not second.driven:
                 first, second = second, first
+                ratio, offset = (1.0 / ratio, -offset / ratio) if ratio else (0.0, 0.0)
             if not second.mimics:
-                coupled[first.name] = replace(first, mimics=second.name)
+                coupled[first.name] = replace(first, mimics=second.name, ratio=ratio, offset=offset)
     return coupled

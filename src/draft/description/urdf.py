@@ -245,6 +245,8 @@ def _joint(element: Element, links: dict[str, Link]) -> Joint:
         velocity=_limit(limit, "velocity"),
         where=element.where,
         mimics=None if follows is None else follows.attributes.get("joint"),
+        ratio=1.0 if follows is None else follows.number("multiplier", 1.0),
+        offset=0.0 if follows is None else follows.number("offset", 0.0),
     )
 
 

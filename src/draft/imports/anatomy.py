@@ -139,10 +139,11 @@ def _humanoid_limb(reduced: Reduced, limb: Body, key: str, limbs: Limbs) -> None
         or (_is_arm(limb) and not _between_arms(limb, limbs))
         or (not limbs.legs and _is_longest(limb))
     ):
-        _limb(reduced, limb, ARM, key)
+        _limb(reduced, limb, ARM, key, holds=bool(limbs.legs))
     else:
         way = run(limb)
-        collapse(reduced, way[-1], "branching joints")
+        if limbs.legs:
+            collapse(reduced, way[-1], "branching joints")
         for body in way:
             body.role = "neck"
     end = run(limb)[-1]
@@ -178,9 +179,12 @@ def _is_longest(limb: Body) -> bool:
     return all(len(slides.hinges(one.all())) <= own for one in beside)
 
 
-def _limb(reduced: Reduced, limb: Body, allowed: Sequence[str], key: str) -> None:
-    """Roles of the hinges of one leg or arm; what branches at its end is held."""
-    collapse(reduced, run(limb)[-1], "branching joints")
+def _limb(
+    reduced: Reduced, limb: Body, allowed: Sequence[str], key: str, holds: bool = True
+) -> None:
+    """Roles of the hinges of one leg or arm; what branches at its end is held, if it `holds`."""
+    if holds:
+        collapse(reduced, run(limb)[-1], "branching joints")
     way = slides.hinges(run(limb))
     names = [body.joint.name if body.joint else "" for body in way]
     found = [roles.role(name, key, "humanoid") or "" for name in names]

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from draft.errors import Location, Problem
-from draft.imports.ends import Node
+from draft.imports.anatomy import run
+from draft.imports.ends import FINGER, Node
 from draft.imports.formatting import Value, tidy
 from draft.imports.limbs import NO_LEGS, NO_REACH, Limbs
 from draft.imports.motors import Motor, all_servos, with_kinds
@@ -15,7 +16,21 @@ from draft.imports.reduce import Body, Reduced
 from draft.imports.shapes import Shapes
 
 LEAST = 0.01  # Smallest edge of a pedestal [m].
-FINGER = 0.25  # Distance of a finger's joints from its first, at most [m].
+LONGEST = 0.25  # Distance of a finger's joints from its first, at most [m].
+
+
+def name_fingers(reduced: Reduced, limbs: Limbs, stated: bool) -> None:
+    """Give the fingers of a hand, or of one on an arm, that is bolted to the world their role."""
+    if _is_fixed(reduced, limbs, stated):
+        for finger in _fingers(reduced.root):
+            for body in finger.all():
+                body.role = FINGER
+
+
+def _is_fixed(reduced: Reduced, limbs: Limbs, stated: bool) -> bool:
+    """Whether no limb reaches the ground, and nothing says that the robot floats."""
+    free = bool(reduced.description.floats) or reduced.description.root not in reduced.root.links
+    return not (limbs.legs or stated or free)
 
 
 def families(
@@ -29,7 +44,7 @@ def families(
     if limbs.legs:
         return motors, ""
     where = Location(reduced.description.file)
-    if stated or reduced.description.floats or reduced.description.root not in reduced.root.links:
+    if not _is_fixed(reduced, limbs, stated):
         remedy = "masses are those of arms of humanoids; `population` names another population"
         reduced.notes.append(Problem(NO_LEGS, where, remedy))
         return motors, ""
@@ -41,16 +56,24 @@ def families(
 
 
 def _link_class(reduced: Reduced, motors: Sequence[Motor]) -> str:
-    """Links of fingers, of a collaborative arm, or of one whose motors carry it."""
-    limbs = reduced.root.children
-    if len(limbs) > 1 and all(map(_is_finger, limbs)):
-        return "finger"
+    """Links of fingers, of a collaborative arm, or of one whose motors carry it.
+
+    Fingers on an arm have their own.
+    """
+    if reduced.root.children == _fingers(reduced.root):
+        return FINGER
     return "light_link" if all_servos(motors) else "cobot_link"
 
 
-def _is_finger(limb: Body) -> bool:
-    """Whether all joints of a limb lie near its first."""
-    return all(float(np.linalg.norm(b.anchor - limb.anchor)) < FINGER for b in limb.all())
+def _fingers(base: Body) -> list[Body]:
+    """Limbs that branch from a body or further out, the joints of each near its first."""
+    palm = run(base)[-1]
+    near = all(
+        float(np.linalg.norm(body.anchor - limb.anchor)) < LONGEST
+        for limb in palm.children
+        for body in limb.all()
+    )
+    return palm.children if near else [one for limb in palm.children for one in _fingers(limb)]
 
 
 def pedestal(reduced: Reduced, shapes: Shapes) -> Node:

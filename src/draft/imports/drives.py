@@ -89,7 +89,7 @@ def drives(
         DescriptionError: `options.strict` and a declared torque is implausible.
         DraftError: a stated name means no joint.
     """
-    bodies = [one for one in reduced.root.all() if one.joint is not None and not one.slides]
+    bodies = [one for one in reduced.root.all() if one.driven]
     named = {body.joint.name: body.role for body in bodies if body.joint}
     options.torque.check(named, "`torque`")
     options.speed.check(named, "`speed`")

@@ -17,6 +17,8 @@ FOOT = np.array([0.2, 0.08, 0.05])
 OBLONG = 1.5
 BALL = 0.02
 THINNEST = 0.005
+FINGER = "finger"  # role, link class and name of the limbs of a hand
+_HAND, _FINGERTIP = 0.08, 0.02  # edges of a hand, and of a fingertip, without shapes [m]
 ROUND = ("cylinder", "sphere", "capsule", "ellipsoid")
 SOLE = 0.01
 # Mass of a wheel over its cylinder [kg/m3]: the median of the surveyed wheels, n = 2 robots with
@@ -87,7 +89,8 @@ def plate_foot(body: Body, site: str, shapes: Shapes, parameters: Parameters) ->
 
 def ball_end(body: Body, name: str, shapes: Shapes, parameters: Parameters) -> Node:
     """Member and sphere of a hand or a head."""
-    at, radius = extent(body.links, body.anchor, _onward(body), shapes)
+    edge = _FINGERTIP if body.role == FINGER else _HAND
+    at, radius = extent(body.links, body.anchor, _onward(body), shapes, edge)
     way = at - body.anchor
     length = float(np.linalg.norm(way))
     long = parameters.add(f"{name}_length", length, f"Last hinge to the centre of the {name}.", 4)
@@ -96,8 +99,13 @@ def ball_end(body: Body, name: str, shapes: Shapes, parameters: Parameters) -> N
     return {"type": "sphere", "link": member, "sphere": {"radius": wide}}
 
 
-def extent(links: list[str], anchor: Array, onward: Array, shapes: Shapes) -> tuple[Array, float]:
-    """Centre [m] and radius [m] of the sphere that stands for links beyond an anchor."""
+def extent(
+    links: list[str], anchor: Array, onward: Array, shapes: Shapes, edge: float = _HAND
+) -> tuple[Array, float]:
+    """Centre [m] and radius [m] of the sphere that stands for links beyond an anchor.
+
+    Without shapes, the links fill a cube of an edge [m].
+    """
     points = shapes.points(links)
     if len(points):
         low, high = points.min(axis=0), points.max(axis=0)
@@ -105,7 +113,7 @@ def extent(links: list[str], anchor: Array, onward: Array, shapes: Shapes) -> tu
     else:
         edges = shapes.box(links)
         if edges.min() < 0.01:
-            edges = np.full(3, 0.08)
+            edges = np.full(3, edge)
         centre = anchor + onward * float(edges.max()) / 2
     if np.linalg.norm(centre - anchor) < 0.02:
         centre = anchor + onward * max(float(edges.max()) / 2, 0.02)

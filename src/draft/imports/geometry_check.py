@@ -92,7 +92,9 @@ def check_geometry(
     theirs, ours = mujoco.MjData(maker), mujoco.MjData(model)
     _hold(description, names, maker, theirs)
     mujoco.mj_kinematics(maker, theirs)
-    upright = np.array(description.turned) @ theirs.xmat[trunk].reshape(3, 3)
+    # Of a URDF only the links of the import are compiled, so that its root is upright in MuJoCo.
+    base = description.upright if description.format == "urdf" else description.turned
+    upright = np.array(base) @ theirs.xmat[trunk].reshape(3, 3)
     distances = np.zeros((POSES + 1, len(pairs)))
     angles = np.zeros_like(distances)
     rng = np.random.default_rng(SEED)
@@ -253,8 +255,11 @@ def _differences(
 
 
 def _limit_difference(pair: _Pair, maker: mujoco.MjModel, model: mujoco.MjModel) -> float:
-    """Largest difference of a limit [rad or m]; 0 of a wheel, or of one changed with a warning."""
-    if pair.body.role in ROLLING:
+    """Largest difference of a limit [rad or m]; 0 where the file's is not taken.
+
+    That is of a wheel, of a joint that follows another, and of one changed with a warning.
+    """
+    if pair.body.role in ROLLING or pair.body.coupled:
         return 0.0
     if not maker.jnt_limited[pair.theirs] or pair.joint.limits != pair.body.limits:
         return 0.0

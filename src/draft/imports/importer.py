@@ -25,7 +25,7 @@ from draft.errors import (
 from draft.files import new_folder
 from draft.imports import names, notes, parts, plausibility, sides, summary, trunk, write
 from draft.imports.anatomy import analyse
-from draft.imports.base import families, pedestal
+from draft.imports.base import families, name_fingers, pedestal
 from draft.imports.drives import Drive, drives, example
 from draft.imports.expected import doubts, expected_mass
 from draft.imports.formatting import Deviation, Parameters
@@ -232,7 +232,9 @@ def translate(
     population = limbs.population
     opened = open_loops(description, limbs.ends)
     description = opened.description
-    reduced = reduce(description, key, population, options.torque, opened.linkage)
+    reduced = reduce(
+        description, key, population, options.torque, opened.linkage, fingers=not limbs.legs
+    )
     plausibility.check_depth(reduced.root)
     kept = {body.joint.name for body in reduced.root.all() if body.joint}
     reduced.notes += [*opened.notes(kept), *doubts]
@@ -243,6 +245,7 @@ def translate(
     unique = names.Unique()
     bodies = reduced.root.all()[1:]
     driven = drives(reduced, population, options, shapes)
+    name_fingers(reduced, limbs, stated=wanted is not None)
     classes, links = families(
         motors(bodies, driven, unique), reduced, limbs, stated=wanted is not None
     )

@@ -44,7 +44,7 @@ def motors(bodies: Sequence[Body], drives: Mapping[str, Drive], taken: Unique) -
     """Group joints by torque, speed and where these are from, strongest first."""
     groups: dict[tuple[float, float, str, str], list[Body]] = {}
     for body in bodies:
-        if body.joint is None or body.slides:
+        if body.joint is None or not body.driven:
             continue
         own = drives[body.joint.name]
         key = (own.torque, own.speed, own.torque_from, own.speed_from)

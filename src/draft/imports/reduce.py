@@ -76,6 +76,16 @@ class Body:
         """Whether its joint is prismatic."""
         return self.joint is not None and self.joint.type == "prismatic"
 
+    @property
+    def coupled(self) -> bool:
+        """Whether its joint follows another one."""
+        return self.joint is not None and bool(self.joint.mimics)
+
+    @property
+    def driven(self) -> bool:
+        """Whether a drive moves it: it has a hinge that follows no other joint."""
+        return self.joint is not None and not self.slides and not self.coupled
+
 
 @dataclass
 class Reduced:
@@ -109,6 +119,7 @@ def reduce(
     population: str,
     stated: Stated | None = None,
     linkage: Collection[str] = (),
+    fingers: bool = False,
 ) -> Reduced:
     """Reduce a description to bodies, driven hinges and slides.
 
@@ -118,6 +129,8 @@ def reduce(
         population: "humanoid" or "quadruped".
         stated: torques that a person states; joints named by them are driven.
         linkage: joints of linkages, which are held.
+        fingers: whether fingers move, and joints that mimic others follow them: those of a robot
+            with legs are held.
 
     Raises:
         DescriptionError: numbers that cannot be, or no hinge that is driven.
@@ -125,8 +138,8 @@ def reduce(
     counts: Counter[str] = Counter()
     notes = list(description.notes)
     given = (description, key, population, stated or Stated(), linkage)
-    held = _held(*given, notes, counts)
-    if all(joint.name in held for joint in description.moving):
+    held = _held(*given, notes, counts, fingers)
+    if not fingers and all(joint.name in held for joint in description.moving):
         # A hand or a finger alone: its fingers are limbs.
         counts, notes = Counter(), list(description.notes)
         held = _held(*given, notes, counts, fingers=True)
@@ -148,7 +161,7 @@ def reduce(
 
 def require_hinge(description: Description, root: Body) -> None:
     """Refuse a robot without a driven hinge: no actuator class could be made for it."""
-    if all(body.slides for body in root.all()[1:]):
+    if not any(body.driven for body in root.all()[1:]):
         where = description.links[description.root].where
         hinges = [one for one in description.moving if one.type in ("revolute", "continuous")]
         if hinges:
@@ -180,6 +193,8 @@ def _held(
             continue
         small = not fingers and len(_moving_below(description, joint)) <= HAND
         why = _why_held(joint, key, population, small)
+        if fingers and why == "mimicking" and joint.ratio:
+            why = ""  # Held after all if what it follows is.
         slides = joint.type == "prismatic"
         if joint.name in linkage:
             why = "linkage"
@@ -204,6 +219,13 @@ def _held(
                 allowed = "usable: above 0" if slides else f"usable: {WEAKEST} N m and more, or "
                 allowed += "" if slides else f"state it, `torque` {joint.name}=VALUE"
                 notes.append(Problem(cause, joint.where, allowed))
+    left = {one.name: one.mimics for one in description.moving if one.name not in held}
+    moved = {name for name, leader in left.items() if not leader}
+    while more := {name for name, leader in left.items() if leader in moved} - moved:
+        moved |= more
+    if lost := set(left) - moved:  # What they follow is held, or follows them.
+        held |= lost
+        counts["mimicking joints"] += len(lost)
     return held
 
 

@@ -91,7 +91,7 @@ def _end(last: Body, start: Array, reduced: Reduced) -> Array:
 def tell(reduced: Reduced) -> None:
     """Count and note the drives of the slides that are kept."""
     for body in reduced.root.all():
-        if body.slides and body.joint is not None:
+        if body.slides and not body.coupled and body.joint is not None:
             reduced.counts[LEFT_OUT] += 1
             cause = f"prismatic joint '{body.joint.name}' is kept without its drive"
             remedy = "no trend knows linear drives: this one weighs nothing"

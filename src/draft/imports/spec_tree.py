@@ -15,7 +15,7 @@ from draft.imports import ends, names
 from draft.imports.anatomy import ROLLING, WHEEL, run
 from draft.imports.attachments import Attachments, opposite, side_of
 from draft.imports.bends import held_bends
-from draft.imports.ends import Node
+from draft.imports.ends import FINGER, Node
 from draft.imports.formatting import Parameters, Record, along, direction, vector
 from draft.imports.home import home_pose
 from draft.imports.knees import Knees
@@ -28,7 +28,14 @@ from draft.imports.volumes import Volumes
 from draft.laws import structure
 from draft.values import Array
 
-CHAINS = {"hip": "leg", "shoulder": "arm", "waist": "waist", "neck": "neck", "knee": "leg"}
+CHAINS = {
+    "finger": "finger",
+    "hip": "leg",
+    "shoulder": "arm",
+    "waist": "waist",
+    "neck": "neck",
+    "knee": "leg",
+}
 INSTEAD = {"ankle_link": "foot", "neck_link": "head", "knee_link": "shank", "elbow_link": "forearm"}
 OTHER = "other"
 
@@ -76,13 +83,17 @@ class Writer:
         self.chain_names = names.Unique()
         self.sites: set[str] = set()
         self.prefixes: list[str] = [""]
+        self.followers: list[Node] = []
         self.tree = Tree()
 
     def write(self) -> Tree:
         """Write all limbs."""
         for body in self.reduced.root.all():
-            body.kind = self.link_class or INSTEAD.get(body.kind, body.kind)
+            own = FINGER if body.role == FINGER else self.link_class
+            body.kind = own or INSTEAD.get(body.kind, body.kind)
         self.tree.children = self.uses(self.reduced.root)
+        for follows in self.followers:  # of joints of other chains, which have full names
+            follows["joint"] = self.tree.joints[str(follows["joint"])]
         return self.tree
 
     def uses(self, body: Body) -> list[Node]:
@@ -215,9 +226,10 @@ class Writer:
             change: Node = {}
             if copy.reverse[i]:
                 change["reverse"] = True
-            if a.role not in ROLLING and vector(a.limits, 4) != vector(b.limits, 4):
+            fixed = a.role in ROLLING or a.coupled
+            if not fixed and vector(a.limits, 4) != vector(b.limits, 4):
                 change["range"] = vector(b.limits, 4)
-            if own[i] != homes[i]:
+            if not fixed and own[i] != homes[i]:
                 change["home"] = own[i]
             if change:
                 found[joints[i]] = change
@@ -228,12 +240,13 @@ class Writer:
     ) -> tuple[list[Node], list[float]]:
         """Nodes of a chain, from the housing of its first motor, if it has one, to its end."""
         homes = home_pose(way)
-        nodes: list[Node] = [] if way[0].slides else [self.housing(way[0], links[0])]
+        nodes: list[Node] = [self.housing(way[0], links[0])] if way[0].driven else []
+        own = {body.joint.name: name for body, name in zip(way, joints, strict=True) if body.joint}
         for i, body in enumerate(way):
             node: Node = {"name": links[i]}
             if i and body.merged:
                 node["at"] = vector(body.anchor - way[i - 1].anchor, self.parameters.digits)
-            node["joint"] = self.joint(body, joints[i], homes[i])
+            node["joint"] = self.joint(body, joints[i], homes[i], own)
             first = len(nodes)
             nodes.append(node)
             if i + 1 < len(way):
@@ -272,16 +285,24 @@ class Writer:
             motor["shift"] = along(inward, f"{self.drive(body)}.length / 2")
         return {"name": f"{name}_housing", "motor": motor}
 
-    def joint(self, body: Body, name: str, home: float) -> Node:
-        """Joint of a link."""
+    def joint(self, body: Body, name: str, home: float, own: Mapping[str, str]) -> Node:
+        """Joint of a link; `own`: names of the joints of its chain by those of the maker."""
         axis = direction(body.axis, self.reduced.digits + 1)
         if body.role in ROLLING:
             return {"name": name, "axis": axis, "actuator": self.drive(body)}
         joint: Node = {"name": name}
         if body.slides:
             joint["type"] = "slide"
-        elif body.joint is not None and body.joint.limits is None:
+        elif body.joint is not None and body.joint.limits is None and not body.coupled:
             joint["type"] = "continuous"
+        if body.joint is not None and body.joint.mimics:
+            leader, ratio = body.joint.mimics, float(f"{body.joint.ratio:.6g}")
+            follows: Node = {"joint": own.get(leader, leader), "ratio": ratio}
+            if body.joint.offset:
+                follows["offset"] = float(f"{body.joint.offset:.6g}")
+            if leader not in own:
+                self.followers.append(follows)
+            return joint | {"axis": axis, "follows": follows}
         joint |= {"axis": axis, "range": vector(body.limits, 4)}
         if not body.slides:
             joint["actuator"] = self.drive(body)
@@ -296,10 +317,12 @@ class Writer:
     def middle(self, nodes: list[Node], body: Body, below: Body, name: str) -> None:
         """Add to the last node the member to the next joint, and that joint's motor."""
         node, way = nodes[-1], below.anchor - body.anchor
-        if below.slides:
+        if not below.driven and not below.merged:
             node["link"] = self.member(body, way, name)
             return
         bends = [] if body.slides else held_bends(self.reduced, body, below)
+        if not below.driven:
+            return
         motor: Node = {"actuator": self.drive(below), "axis": direction(below.axis)}
         if below.merged:
             if np.any(way):
@@ -394,7 +417,9 @@ class Writer:
             return ends.plate_foot(body, self.site(), self.shapes, self.parameters)
         if body.role in ("knee", "hip", "ankle") and body.kind in self.known:
             return ends.sphere_foot(body, body.kind, self.site(), self.shapes, self.parameters)
-        word = {"neck": "head"}.get(body.role, "hand" if body.role in ("wrist", "elbow") else "end")
+        word = {"neck": "head", "finger": "tip"}.get(
+            body.role, "hand" if body.role in ("wrist", "elbow") else "end"
+        )
         node = ends.ball_end(body, word, self.shapes, self.parameters)
         member = node["link"]
         assert isinstance(member, dict)

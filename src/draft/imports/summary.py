@@ -69,8 +69,11 @@ def _joints(files: Files) -> str:
         for name, count in counts.items()
         if name.endswith(" joints")
     ]
-    slides = len(files.joints) - len(files.drives)
+    moving = [body for body in files.reduced.root.all() if body.joint is not None]
+    coupled = sum(body.coupled for body in moving)
+    slides = sum(body.slides and not body.coupled for body in moving)
     text = f"{len(files.drives)} driven hinges"
+    text += f", {coupled} joints that follow them" if coupled else ""
     text += f", {slides} slides without a drive" if slides else ""
     text += f"; held or dropped: {', '.join(held)}" if held else "; none held"
     fixed = counts.get("fixed joints merged", 0)

@@ -80,7 +80,8 @@ def _counterparts(first: Sequence[Body], other: Sequence[Body]) -> bool:
     if first[-1].children or other[-1].children:
         return False
     parts = [
-        [(one.role, one.kind, one.merged, one.slides) for one in way] for way in (first, other)
+        [(one.role, one.kind, one.merged, one.slides, one.coupled) for one in way]
+        for way in (first, other)
     ]
     return bool(parts[0][0][1] or first[0].role) and parts[0] == parts[1]
 
@@ -110,6 +111,8 @@ def _matches(
             return None
         if classes.get(a.joint.name) != classes.get(b.joint.name):
             return None
+        if _coupling(a, first) != _coupling(b, other):
+            return None
         if (a.joint.limits is None) != (b.joint.limits is None):
             return None
         gap = signs * (a.anchor - first[0].anchor) - (b.anchor - other[0].anchor)
@@ -125,6 +128,17 @@ def _matches(
         above.append((a.anchor, turned(b, off)))
         reverse.append(float(axis @ b.axis) < 0)
     return tuple(reverse)
+
+
+def _coupling(body: Body, way: Sequence[Body]) -> tuple[float | str, ...]:
+    """How the joint of a body follows another one: its place in the limb, or else its name."""
+    joint = body.joint
+    if joint is None or joint.mimics is None:
+        return ()
+    names = [one.joint.name if one.joint is not None else "" for one in way]
+    known = joint.mimics in names
+    leader = names.index(joint.mimics) if known else joint.mimics
+    return leader, joint.ratio, joint.offset
 
 
 def kept(axis: Array, signs: Array) -> Array:

@@ -77,7 +77,7 @@ class Volumes:
 
     def _carried(self, body: Body) -> float:
         """Mass of the drives of the next joints, which sit on a body [kg]."""
-        named = [child.joint.name for child in body.children if child.joint and not child.slides]
+        named = [child.joint.name for child in body.children if child.joint and child.driven]
         mass = laws().trends["mass"]
         return sum(float(mass(self.drives[name].torque)) for name in named)
 
