@@ -23,7 +23,7 @@ from draft.design.legs import GRAVITY, LegJoint
 from draft.design.limbs import Column, Limb, columns, frames_at, limbs
 from draft.design.loads import Load
 from draft.design.parts import Coupling
-from draft.geometry import Frame, Rotation, Vector
+from draft.geometry import Frame, Vector
 from draft.values import (
     Mask,
     Value,
@@ -155,6 +155,34 @@ def _load(column: Column, angle: Value) -> Load:
     return Load(joint, actuator, GRAVITY * hang, GRAVITY * lift)
 
 
+class _Circle(NamedTuple):
+    """Circle on which a joint moves the tip, seen from above: middle + radial cos q + across sin q.
+
+    Attributes:
+        middle, radial, across: components along x and y, from the shoulder [m].
+    """
+
+    middle: tuple[Value, Value]
+    radial: tuple[Value, Value]
+    across: tuple[Value, Value]
+
+    def at(self, angle: Value) -> tuple[Value, Value]:
+        """Tip with the joint at an angle [m]."""
+        c, s = cos(angle), sin(angle)
+        x, y = (m + r * c + a * s for m, r, a in zip(*self, strict=True))
+        return x, y
+
+    def motion(self, angle: Value) -> tuple[Value, Value]:
+        """Motion of the tip per angle [m/rad]."""
+        c, s = cos(angle), sin(angle)
+        x, y = (a * c - r * s for _, r, a in zip(*self, strict=True))
+        return x, y
+
+    def distance(self, angle: Value) -> Value:
+        """Distance of the tip from the shoulder [m]."""
+        return hypot(*self.at(angle))
+
+
 class Search:
     """Search for the pose, from a pose within the ranges.
 
@@ -186,13 +214,15 @@ class Search:
         self._outward(self._stretch)
         self._inward(self._stretch)
         before = self.reach()
-        for _ in range(SWEEPS):
-            self._outward(self._turn)
-            self._inward(self._turn)
-            self._rising = self.reach() - before > _STILL * self.length
+        for k in range(2 * SWEEPS):
+            sweep, last = (self._inward, 0) if k % 2 else (self._outward, self.n - 1)
+            sweep(self._turn)
+            after = self.reach(last)
+            self._rising = after - before > _STILL * self.length
             if not some(self._rising):
                 break
-            before = self.reach()
+            before = after
+        self._inward()
 
     def _run_coupled(self) -> None:
         """Turn one driven joint after the other, with those that follow it, by trial of angles.
@@ -270,16 +300,26 @@ class Search:
         if step is not None:
             self.angles[j] = where(self._rising, step(j), self.angles[j])
 
-    def reach(self) -> Value:
-        """Distance of the tip from the shoulder along the horizontal [m]."""
-        x, y, _ = self._from_shoulder(0, self.angles[0])
-        return hypot(x, y)
+    def reach(self, j: int = 0) -> Value:
+        """Distance of the tip from the shoulder along the horizontal [m].
 
-    def _from_shoulder(self, j: int, angle: Value) -> Vector:
-        """Vector from the shoulder to the tip in the world, with a joint at an angle [m]."""
-        origin, rotation = self.frames[j]
-        tip = g.rotate(rotation, turned(self.of[j].axis, angle, self.tips[j]))
-        return g.subtract(g.add(origin, tip), self.shoulder)
+        Args:
+            j: a joint whose frame and tip are those of all angles.
+        """
+        return self._circle(j).distance(self.angles[j])
+
+    def _circle(self, j: int) -> _Circle:
+        """Circle on which a joint moves the tip, seen from above."""
+        (origin, rotation), axis, tip = self.frames[j], self.of[j].axis, self.tips[j]
+        along = g.scale(axis, g.dot(axis, tip))
+        x, y, _ = g.IDENTITY if rotation is None else rotation
+        middle = g.subtract(origin, self.shoulder)
+        radial, across = g.subtract(tip, along), g.cross(axis, tip)
+        return _Circle(
+            (middle[0] + g.dot(x, along), middle[1] + g.dot(y, along)),
+            (g.dot(x, radial), g.dot(y, radial)),
+            (g.dot(x, across), g.dot(y, across)),
+        )
 
     def _straighten(self, j: int) -> Value:
         """Angle of a joint with the tip furthest from the last joint before it that sees it."""
@@ -298,37 +338,41 @@ class Search:
     def _away(self, j: int, point: Vector) -> tuple[Value, Mask]:
         """Angle of a joint with the tip furthest from a point, and whether the joint is idle."""
         origin, rotation = self.frames[j]
-        away = _unrotated(rotation, g.subtract(origin, point))
-        return self._best(j, away, self.length)
+        away = g.subtract(origin, point)
+        if rotation is not None:
+            away = g.rotate(g.transposed(rotation), away)
+        axis, tip = self.of[j].axis, self.tips[j]
+        along = g.scale(axis, g.dot(axis, tip))
+        a, b = g.dot(away, g.subtract(tip, along)), g.dot(away, g.cross(axis, tip))
+        return self._best(j, a, b, self.length)
 
     def _turn(self, j: int) -> Value:
         """Angle of a joint with the tip furthest along its direction, or against it."""
-        x, y, _ = self._from_shoulder(j, self.angles[j])
-        above = hypot(x, y) <= _TINY * self.length
+        circle, tiny = self._circle(j), _TINY * self.length
+        x, y = circle.at(self.angles[j])
+        size = hypot(x, y)
+        above = size <= tiny
         if some(above):  # Above or below the shoulder every direction is as good: that of motion.
-            motion = g.cross(self.of[j].axis, turned(self.of[j].axis, self.angles[j], self.tips[j]))
-            u, v, _ = g.rotate(self.frames[j][1], motion)
+            u, v = circle.motion(self.angles[j])
             x, y = where(above, u, x), where(above, v, y)
-        size = maximum(hypot(x, y), _TINY * self.length)
-        along = _unrotated(self.frames[j][1], (x / size, y / size, 0.0))
-        ahead, _ = self._best(j, along, 1.0)
-        back, _ = self._best(j, g.scale(along, -1.0), 1.0)
-        found = [self._from_shoulder(j, angle) for angle in (ahead, back)]
-        gain = hypot(*found[1][:2]) - hypot(*found[0][:2])
-        return where(gain > _TINY * self.length, back, ahead)
+            size = maximum(hypot(x, y), tiny)
+        (ax, ay), (bx, by) = circle.radial, circle.across
+        a, b = (x * ax + y * ay) / size, (x * bx + y * by) / size
+        ahead, _ = self._best(j, a, b, 1.0)
+        back, _ = self._best(j, -a, -b, 1.0)
+        gain = circle.distance(back) - circle.distance(ahead)
+        return where(gain > tiny, back, ahead)
 
-    def _best(self, j: int, direction: Vector, unit: Value) -> tuple[Value, Mask]:
-        """Angle in the range of a joint at which the tip is furthest along a direction.
+    def _best(self, j: int, a: Value, b: Value, unit: Value) -> tuple[Value, Mask]:
+        """Angle q in the range of a joint at which a cos q + b sin q is largest.
 
         Args:
             j: the joint; it stays where it is if it does not move the tip along the direction.
-            direction: in the frame of the joint.
+            a: radial part of the tip along a direction.
+            b: motion of the tip along the direction, with the joint at zero.
             unit: size of the direction.
         """
-        one, tip = self.of[j], self.tips[j]
-        along = g.scale(one.axis, g.dot(one.axis, tip))
-        a = g.dot(direction, g.subtract(tip, along))
-        b = g.dot(direction, g.cross(one.axis, tip))
+        one = self.of[j]
         idle = hypot(a, b) <= _TINY * self.length * unit
         past = (atan2(b, a) - one.low) % (2.0 * math.pi)
         span = one.high - one.low
@@ -345,7 +389,3 @@ def turned(axis: Vector, angle: Value, v: Vector) -> Vector:
     c, s = cos(angle), sin(angle)
     across = g.scale(g.subtract(v, along), c)
     return g.add(along, g.add(across, g.scale(g.cross(axis, v), s)))
-
-
-def _unrotated(rotation: Rotation, v: Vector) -> Vector:
-    return v if rotation is None else g.rotate(g.transposed(rotation), v)
