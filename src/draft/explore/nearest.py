@@ -18,11 +18,12 @@ import yaml
 from draft.design import Design
 from draft.explore.goals import Constraint
 from draft.explore.sensitivity import stated_numbers
-from draft.metrics import LEARNED, of_design
+from draft.metrics import LEARNED, find, of_design
 from draft.values import Array, Value, scalar, told_apart
 from draft.variation.axes import Axis
 
 _FIRST, _EACH = 8192, 2048  # Designs of the first look, and of each round.
+_FEWER = 32  # This many times fewer where a metric takes thousands of poses of each design.
 _ROUNDS, _SHRINK = 24, 0.72
 _BEST = 8  # Solutions that a round searches around.
 _TIDY = 1.01  # A change may grow by this for fewer numbers that change.
@@ -130,6 +131,8 @@ class Search:
         self._metrics = sorted(
             {name for one in conditions for name in one.holds.metrics if name not in LEARNED}
         )
+        fewer = _FEWER if any(find(name).sampled for name in self._metrics) else 1
+        self._first, self._each = _FIRST // fewer, _EACH // fewer
         self.tried = 0
 
     def run(self) -> Solution:
@@ -150,9 +153,10 @@ class Search:
         """Nearest design that meets conditions, or that which misses least; and its violations."""
         count = len(self._axes)
         spread = (
-            self._rng.uniform(-1, 1, (_FIRST, count)) * self._rng.uniform(0, 1, (_FIRST, 1)) ** 2
+            self._rng.uniform(-1, 1, (self._first, count))
+            * self._rng.uniform(0, 1, (self._first, 1)) ** 2
         )
-        box = self._low + self._rng.random((_FIRST // 2, count)) * self._size
+        box = self._low + self._rng.random((self._first // 2, count)) * self._size
         drawn = np.concatenate(
             [np.zeros((1, count)), self._inside(spread), (box - self._start) / self._size]
         )
@@ -162,7 +166,7 @@ class Search:
                 break
             # No design meets all: look around those that miss least.
             order = np.argsort(violation.sum(axis=1), kind="stable")[:64]
-            around = np.repeat(drawn[order], _EACH // 64, axis=0)
+            around = np.repeat(drawn[order], self._each // 64, axis=0)
             more = self._inside(around + self._rng.normal(0, 0.25 * 0.6**k, around.shape))
             drawn = np.concatenate([drawn[order], more])
             violation = np.concatenate([violation[order], self._violations(more, conditions)])
@@ -173,7 +177,7 @@ class Search:
         kept = self._kept(drawn[miss == 0])
         width = 0.3
         for _ in range(_ROUNDS):
-            around = np.repeat(kept, -(-_EACH // len(kept)), axis=0)
+            around = np.repeat(kept, -(-self._each // len(kept)), axis=0)
             # Towards the given design, and aside.
             pull = self._rng.random((len(around), 1)) ** 2
             aside = self._rng.normal(0, width, around.shape) * np.linalg.norm(kept[0])
