@@ -24,7 +24,7 @@ from draft.metrics import of_design
 from draft.metrics.grasp import grasps
 from draft.metrics.impact import pose_inertia
 from draft.metrics.stretch import stretched
-from draft.model.batch import build_batch
+from draft.model.batch import build_batch, indices
 from draft.values import Array, scalar
 from tests import fixed
 from tests.helpers import ids, leg, robot
@@ -272,6 +272,14 @@ def test_models_of_a_batch_have_the_couplings_of_those_compiled_alone() -> None:
         alone, model = design[place].build().mujoco, batch.model(place)
         assert model.eq_data == pytest.approx(alone.eq_data)
         assert model.jnt_range == pytest.approx(alone.jnt_range)
+
+
+def test_the_couplings_of_a_batch_go_into_a_scene() -> None:
+    design = coupled_hand().resolve({"share": np.array([0.5, 0.9])})
+    batch, scene = build_batch(design), design[0].build().scene()
+    batch.write(1, scene, indices(batch.template, scene))
+    assert scene.eq_data == pytest.approx(batch.model(1).eq_data)
+    assert scene.equality("thumb_distal").data[1] == pytest.approx(0.9)
 
 
 # --- loads and limbs -----------------------------------------------------------------------

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from draft.design.actuators import Actuator
 from draft.design.design import Design
 from draft.design.findings import Finding, note
-from draft.laws.catalogue import MODULE, Extremes, Part, aspect_range, extremes
+from draft.laws.catalogue import MODULE, SERVO, Extremes, Part, aspect_range, extremes
 from draft.values import Value, either, log, maximum, minimum, power, some
 
 # Real modules reach the limits: rounding must not refuse a design that copies one.
@@ -25,6 +25,7 @@ def used(design: Design) -> list[Actuator]:
 
 def actuator(a: Actuator, own: tuple[Part, ...] = ()) -> Iterator[Finding]:
     """Compare an actuator class with the catalogue and the modules of the spec's own."""
+    stronger = "; `kind: module` sizes a stronger one"
     for kind, name, value, unit in (
         ("torque", "peak torque", a.peak_torque, "N m"),
         ("torque_density", "torque density", a.peak_torque / a.mass, "N m/kg"),
@@ -36,7 +37,7 @@ def actuator(a: Actuator, own: tuple[Part, ...] = ()) -> Iterator[Finding]:
             a.name,
             value > limit * ROUNDING,
             f"{name} {{value}} of '{a.name}' is beyond {{limit}}, the highest of {a.kind}s "
-            "with such a reduction",
+            "with such a reduction" + stronger * (kind == "torque" and a.kind == SERVO),
             source,
             value,
             limit,

@@ -188,6 +188,7 @@ _KINDS = {
     "geom": "geom",
     "site": "site",
     "bvh": "box",
+    "eq": "equality",
 }
 
 
@@ -205,8 +206,8 @@ def indices(robot: mujoco.MjModel, model: mujoco.MjModel, prefix: str = "") -> d
         prefix: what stands before its names in `model`.
 
     Returns:
-        For "body", "joint", "dof", "position", "geom", "site" and "box" the rows in `model`, and
-        under "own body" and so on those in `robot` that they belong to.
+        For "body", "joint", "dof", "position", "geom", "site", "box" and "equality" the rows in
+        `model`, and under "own body" and so on those in `robot` that they belong to.
 
     Raises:
         KeyError: the model lacks a part of the robot.
@@ -233,6 +234,8 @@ def indices(robot: mujoco.MjModel, model: mujoco.MjModel, prefix: str = "") -> d
         match("geom", i, model.geom(prefix + robot.geom(i).name).id, 1)
     for i in range(robot.nsite):
         match("site", i, model.site(prefix + robot.site(i).name).id, 1)
+    for i in range(robot.neq):
+        match("equality", i, model.equality(prefix + robot.equality(i).name).id, 1)
     both = found | {f"own {kind}": ids for kind, ids in own.items()}
     return {kind: np.array(ids, dtype=np.intp) for kind, ids in both.items()}
 

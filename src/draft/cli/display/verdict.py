@@ -9,6 +9,7 @@ from draft.design import Design
 from draft.design.findings import grouped
 from draft.design.machine import machine
 from draft.errors import counted
+from draft.spec import Spec
 from draft.values import scalar
 
 STYLES = {"error": "bold red", "warning": "yellow"}
@@ -48,4 +49,13 @@ def print_findings(design: Design) -> None:
             f"[{style}]{severity:<7}[/] [bold]{finding.id}[/] {escape(finding.message)}{allowed}"
         )
         if finding.remedy:
-            out.print(f"        [dim]{escape(finding.remedy)}[/]")
+            at = _place(design.spec, finding.where)
+            out.print(f"        [dim]{escape(f'{at}: ' if at else '')}{escape(finding.remedy)}[/]")
+
+
+def _place(spec: Spec, where: str) -> str:
+    """Place in the files of an actuator class, or of the first of a pair of links; "" for none."""
+    name = where.partition("/")[0]
+    links = {body.name: body.link.where for body in spec.bodies}
+    found = spec.actuators[name].where if name in spec.actuators else links.get(name)
+    return str(found or "")

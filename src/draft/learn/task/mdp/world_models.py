@@ -23,7 +23,7 @@ from draft.learn.bodies.family_fields import family_fields
 from draft.learn.bodies.legged import check_family
 from draft.learn.task.world.access import robot_of
 from draft.model.batch import indices, kind_of
-from draft.model.batch_text import FIELDS as ROBOT_FIELDS
+from draft.model.batch_text import FIELDS as OF_ROBOTS
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from draft.learn.bodies.legged import LeggedRobot
 
 ACTUATOR_FIELDS = ("actuator_forcerange", "actuator_ctrlrange")
-# Fields in which designs of one topology may differ.
+# Fields in which designs of one topology may differ; none of those that learn has joints that
+# follow others.
+ROBOT_FIELDS = tuple(name for name in OF_ROBOTS if not name.startswith("eq_"))
 FIELDS = (*ROBOT_FIELDS, *ACTUATOR_FIELDS)
 _CENTRE = "body_ipos"
 
