@@ -18,7 +18,7 @@ BUDGET = {
     ".": 2_440,
     "assistant": 620,
     "cli": 5_840,
-    "description": 2_250,
+    "description": 2_330,
     "design": 6_400,
     "explore": 4_730,
     "fitting": 3_890,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import pytest
 
 from draft.description.read import describe
@@ -130,6 +131,50 @@ def test_an_equality_of_mjcf_couples_the_joint_without_an_actuator(
     assert (one.mimics, one.ratio) == (leader, pytest.approx(ratio))
     assert one.offset == pytest.approx(offset)
     assert joints[leader].mimics is None
+
+
+GRIPPER = """<mujoco model="gripper"><worldbody><body name="palm">
+<geom type="box" size="0.05 0.05 0.05"/>
+<body name="left" pos="0 0.04 0.1"><joint name="left" axis="1 0 0" range="0 1"/>
+<geom type="box" size="0.01 0.01 0.04" pos="0 0 0.04"/></body>
+<body name="right" pos="0 -0.04 0.1"><joint name="right" axis="-1 0 0" range="0 1"/>
+<geom type="box" size="0.01 0.01 0.04" pos="0 0 0.04"/></body></body></worldbody>
+<tendon><fixed name="split"><joint joint="left" coef="0.5"/>
+<joint joint="right" coef="{coef}"/></fixed></tendon>{equality}<actuator>
+<general name="grip" tendon="split" forcerange="-6 6" ctrlrange="0 1"/></actuator></mujoco>"""
+SAME = '<equality><joint joint1="right" joint2="left"/></equality>'
+
+
+@pytest.mark.parametrize(
+    ("coefficient", "equality", "ratio", "effort"),
+    [(0.5, SAME, 1.0, 6.0), (0.5, "", 1.0, 6.0), (0.25, "", 0.5, 3.75)],
+    ids=["coupled by an equality", "by the tendon alone", "by unlike coefficients"],
+)
+def test_one_drive_of_a_tendon_moves_both_fingers(
+    coefficient: float, equality: str, ratio: float, effort: float, tmp_path: Path
+) -> None:
+    file = tmp_path / "gripper.xml"
+    file.write_text(GRIPPER.format(coef=coefficient, equality=equality), encoding="utf-8")
+    found = import_robot(file, tmp_path / "out")
+    assert couplings(found) == {"right": ("left", ratio, 0.0)}
+    design = found.spec.resolve()
+    (drive,) = (one for one in map(design.drive, design.joints.values()) if one is not None)
+    assert drive.peak_torque == pytest.approx(effort)
+
+
+def test_the_work_of_a_tendon_is_that_of_mujoco(tmp_path: Path) -> None:
+    """Torque of the drive at its joint against the moment arm of MuJoCo's tendon."""
+    text = GRIPPER.format(coef=0.25, equality="")
+    (tmp_path / "gripper.xml").write_text(text, encoding="utf-8")
+    left = describe(tmp_path / "gripper.xml").joints["left"]
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    lengths = []
+    for angle in (0.0, 0.5):
+        data.qpos[:] = angle, 0.5 * angle  # The right joint has half the coefficient.
+        mujoco.mj_forward(model, data)
+        lengths.append(float(data.ten_length[0]))
+    assert left.effort == pytest.approx(6.0 * (lengths[1] - lengths[0]) / 0.5)
 
 
 def test_a_multiplier_that_is_no_number_is_named_with_its_line(tmp_path: Path) -> None:

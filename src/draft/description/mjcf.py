@@ -30,6 +30,7 @@ from draft.description.mjcf_actuators import drives_of
 from draft.description.mjcf_geoms import geometry, mesh_files, place, solid
 from draft.description.mjcf_loops import followed, loops
 from draft.description.mjcf_settings import Compiler, Defaults
+from draft.description.mjcf_tendons import pulled
 from draft.description.rigid import combined, moved, rotated
 from draft.description.xmlfile import DescriptionError, Element, read_file
 from draft.errors import Problem
@@ -117,7 +118,7 @@ class _Reader:
             self.root.where.file,
             "mjcf",
             self.links,
-            followed(self.root, self.joints),
+            pulled(self.root, followed(self.root, self.joints), self.drives.pulls),
             top,
             tuple(self.notes),
             upright,

@@ -11,13 +11,21 @@ from draft.description.xmlfile import Element
 
 @dataclass(frozen=True, slots=True)
 class Drives:
-    """Torque limits of actuators [N m or N] by joint; NaN without a limit."""
+    """Torque limits of actuators [N m or N] by joint, and by tendon; NaN without a limit."""
 
     by_joint: dict[str, float]
+    by_tendon: dict[str, float]
 
     def drives(self, joint: str) -> bool:
         """Whether a joint may have an actuator; in a model without actuators every joint may."""
-        return not self.by_joint or joint in self.by_joint
+        return not (self.by_joint or self.by_tendon) or joint in self.by_joint
+
+    @property
+    def pulls(self) -> dict[str, float]:
+        """Torque limits by tendon, infinite without a limit."""
+        return {
+            name: math.inf if math.isnan(force) else force for name, force in self.by_tendon.items()
+        }
 
     def effort(self, joint: Element, name: str) -> float | None:
         """Effort limit of a joint [N m or N]; None without an actuator, infinite without a limit.
@@ -35,6 +43,7 @@ class Drives:
 def drives_of(root: Element, defaults: Defaults) -> Drives:
     """Read the actuators of a model."""
     table: dict[str, float] = {}
+    tendons: dict[str, float] = {}
     for section in root.all("actuator"):
         for plain in section.children:
             if plain.tag not in ACTUATORS:
@@ -42,9 +51,13 @@ def drives_of(root: Element, defaults: Defaults) -> Drives:
             actuator = defaults.fill(plain, "main")
             given = actuator.attributes
             name = given.get("joint", given.get("jointinparent"))
+            tendon = given.get("tendon")
+            force = _force(actuator) * abs((actuator.some_numbers("gear") or (1.0,))[0])
             if name is not None:
-                table[name] = _force(actuator) * abs((actuator.some_numbers("gear") or (1.0,))[0])
-    return Drives(table)
+                table[name] = force
+            elif tendon is not None:
+                tendons[tendon] = force
+    return Drives(table, tendons)
 
 
 def _force(actuator: Element) -> float:
