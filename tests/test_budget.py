@@ -25,7 +25,7 @@ BUDGET = {
     "imports": 6_530,
     "laws": 2_040,
     "learn": 19_970,
-    "metrics": 3_160,
+    "metrics": 3_200,
     "model": 4_080,
     "reporting": 1_820,
     "serving": 550,
