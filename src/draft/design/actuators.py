@@ -11,9 +11,10 @@ import numpy as np
 from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
-from draft.laws.catalogue import Part
+from draft.laws.catalogue import SERVO, Part
 from draft.laws.limits import copper_loss
 from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantities
+from draft.laws.servos import usual_face_ratio
 from draft.laws.torque_speed import Line, stall_torque, torque_speed
 from draft.values import (
     Value,
@@ -121,8 +122,39 @@ class Actuator(Quantities):
     def copper_loss(self) -> Value:
         """Heat of the motor per torque squared [W/(N m)^2], see `draft.laws.limits`."""
         line = self.peak_torque, self.no_load_speed, self.corner_speed
-        surface = 2.0 * PI * self.radius * (self.radius + self.length)
-        return copper_loss(*line, self.rated_torque, surface)
+        return copper_loss(*line, self.rated_torque, self.surface)
+
+    @property
+    def is_box(self) -> bool:
+        """Whether it is a box, as servos are; else a cylinder."""
+        return self.kind == SERVO
+
+    @property
+    def width(self) -> Value:
+        """Shorter edge of a box across the axis, or diameter of a cylinder [m]."""
+        return self._edge(1.0 / self._face_ratio) if self.is_box else 2.0 * self.radius
+
+    @property
+    def height(self) -> Value:
+        """Longer edge of a box across the axis, or diameter of a cylinder [m]."""
+        return self._edge(self._face_ratio) if self.is_box else 2.0 * self.radius
+
+    @property
+    def surface(self) -> Value:
+        """Surface of its box or cylinder [m2]."""
+        if self.is_box:
+            around = self.width + self.height
+            return 2.0 * (self.width * self.height + around * self.length)
+        return 2.0 * PI * self.radius * (self.radius + self.length)
+
+    @property
+    def _face_ratio(self) -> float:
+        own = self.part.face_ratio if self.part is not None else None
+        return usual_face_ratio() if own is None else own
+
+    def _edge(self, ratio: float) -> Value:
+        """Edge of a face of the area of the circle, from its ratio to the other edge [m]."""
+        return math.sqrt(PI * ratio) * self.radius
 
     def available(self, speed: Value) -> Value:
         """Torque available at a speed in the direction of the torque [N m]; zero or more.

@@ -115,7 +115,13 @@ class Quantities:
     volume: Value = _line(
         "m3", "volume", "Volume of the enclosing cylinder [m3].", shown=("cm³", 1e6), **_READ_ONLY
     )
-    radius: Value = _line("m", "radius", "Radius of the module [m].", shown=("mm", 1e3))
+    radius: Value = _line(
+        "m",
+        "radius",
+        "Radius of the module [m]; of a servo, that of a circle of the area of its box across the "
+        "axis.",
+        shown=("mm", 1e3),
+    )
     length: Value = _line(
         "m", "length", "Length of the module along its axis [m].", shown=("mm", 1e3)
     )
@@ -142,6 +148,12 @@ class Quantities:
 
 
 QUANTITIES: dict[str, Quantity] = {one.name: one.metadata["line"] for one in fields(Quantities)}
+# Edges across the axis: those of the box of a servo, or of the box around the cylinder of a module.
+for _name, _text in (
+    ("width", "Shorter edge of a servo's box across its axis; twice the radius of a module [m]."),
+    ("height", "Longer edge of a servo's box across its axis; twice the radius of a module [m]."),
+):
+    QUANTITIES[_name] = Quantity("m", _name, _text, shown=("mm", 1e3), **_READ_ONLY)
 # A property of the torque-speed line.
 QUANTITIES["stall_torque"] = Quantity(
     "N m", "stall torque", "Torque at standstill without the current limit [N m].", **_READ_ONLY
