@@ -118,6 +118,24 @@ def test_a_servo_by_its_laws_has_the_face_of_the_usual_servo_and_its_volume() ->
     assert servo.width * servo.height == pytest.approx(math.pi * servo.radius**2)
 
 
+def test_edges_say_where_they_are_from() -> None:
+    printed = machine({}, ROD).resolve().actuators["servo"]
+    assert (printed.origins["width"].kind, printed.origins["width"].detail) == (
+        *("catalogue", "XC330-M288"),
+    )
+    wider = machine({}, ROD, servo=XC330 | {"radius": 0.02}).resolve().actuators["servo"]
+    assert wider.origins["height"].kind == "derived"
+    assert wider.height / wider.width == pytest.approx(HIGH / WIDE)
+    stated = {"kind": "servo", "peak_torque": 3, "no_load_speed": 6}
+    design = machine({}, ROD, servo=stated).resolve()
+    bands = design.actuator_bands()["servo"]
+    for edge in ("width", "height"):
+        share = getattr(design.actuators["servo"], edge) / design.actuators["servo"].radius
+        assert list(bands[edge]) == pytest.approx([share * end for end in bands["radius"]])
+    module = draft.load("quadruped").resolve().actuators["leg"]
+    assert not {"width", "height"} & {*module.quantities}
+
+
 def test_expressions_read_the_edges_and_a_module_has_its_diameter() -> None:
     room = parameter("servo.height + 10 * servo.width + 100 * servo.length")
     design = machine({}, ROD, parameters={"room": room}).resolve()

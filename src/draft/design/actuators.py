@@ -130,31 +130,12 @@ class Actuator(Quantities):
         return self.kind == SERVO
 
     @property
-    def width(self) -> Value:
-        """Shorter edge of a box across the axis, or diameter of a cylinder [m]."""
-        return self._edge(1.0 / self._face_ratio) if self.is_box else 2.0 * self.radius
-
-    @property
-    def height(self) -> Value:
-        """Longer edge of a box across the axis, or diameter of a cylinder [m]."""
-        return self._edge(self._face_ratio) if self.is_box else 2.0 * self.radius
-
-    @property
     def surface(self) -> Value:
         """Surface of its box or cylinder [m2]."""
         if self.is_box:
             around = self.width + self.height
             return 2.0 * (self.width * self.height + around * self.length)
         return 2.0 * PI * self.radius * (self.radius + self.length)
-
-    @property
-    def _face_ratio(self) -> float:
-        own = self.part.face_ratio if self.part is not None else None
-        return usual_face_ratio() if own is None else own
-
-    def _edge(self, ratio: float) -> Value:
-        """Edge of a face of the area of the circle, from its ratio to the other edge [m]."""
-        return math.sqrt(PI * ratio) * self.radius
 
     def available(self, speed: Value) -> Value:
         """Torque available at a speed in the direction of the torque [N m]; zero or more.
@@ -330,6 +311,7 @@ def size(
     _drive(sizer, name, where, by_trend)
     sizer.rated()
     _envelope(sizer)
+    _edges(sizer)
     for quantity, line in QUANTITIES.items():
         if isinstance(line.law, Identity):
             sizer.follow([(quantity, line.law)])
@@ -434,3 +416,22 @@ def _envelope(s: _Sizer) -> None:
             s.measured("radius")
             s.measured("length")
     s.follow(_CYLINDER)
+
+
+def _edges(s: _Sizer) -> None:
+    """Derive the edges across the axis; only those of a box have an origin of their own."""
+    radius = s.value["radius"]
+    if s.laws.kind != SERVO:
+        s.value["width"] = s.value["height"] = 2.0 * radius
+        return
+    own = s.part.face_ratio if s.part is not None else None
+    ratio = usual_face_ratio() if own is None else own
+    of_radius = s.origin["radius"]
+    printed = own is not None and of_radius.kind == "catalogue"
+    for edge, share in (("width", 1.0 / ratio), ("height", ratio)):
+        s.value[edge] = math.sqrt(PI * share) * radius
+        s.origin[edge] = of_radius if printed else Origin("derived", _FACE, None, ("radius",))
+
+
+# The longer edge is the usual multiple of the shorter one, or that of the part.
+_FACE = "width height = pi r^2"

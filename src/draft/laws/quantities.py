@@ -125,6 +125,20 @@ class Quantities:
     length: Value = _line(
         "m", "length", "Length of the module along its axis [m].", shown=("mm", 1e3)
     )
+    width: Value = _line(
+        "m",
+        "width",
+        "Shorter edge across the axis of the box of a servo [m]; twice the radius of a module.",
+        shown=("mm", 1e3),
+        stated=False,
+    )
+    height: Value = _line(
+        "m",
+        "height",
+        "Longer edge across the axis of the box of a servo [m]; twice the radius of a module.",
+        shown=("mm", 1e3),
+        stated=False,
+    )
     rotor_inertia: Value = _line(
         "kg m2",
         "rotor inertia",
@@ -148,12 +162,6 @@ class Quantities:
 
 
 QUANTITIES: dict[str, Quantity] = {one.name: one.metadata["line"] for one in fields(Quantities)}
-# Edges across the axis: those of the box of a servo, or of the box around the cylinder of a module.
-for _name, _text in (
-    ("width", "Shorter edge of a servo's box across its axis; twice the radius of a module [m]."),
-    ("height", "Longer edge of a servo's box across its axis; twice the radius of a module [m]."),
-):
-    QUANTITIES[_name] = Quantity("m", _name, _text, shown=("mm", 1e3), **_READ_ONLY)
 # A property of the torque-speed line.
 QUANTITIES["stall_torque"] = Quantity(
     "N m", "stall torque", "Torque at standstill without the current limit [N m].", **_READ_ONLY

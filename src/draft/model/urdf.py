@@ -32,7 +32,10 @@ _NO_LIMIT = 1000.0
 _GIMBAL = 1e-9
 # Torque over speed of an actuator that drives its joint, in the table of the actuators.
 # Quantities of a module that its joint has under another name, or does not show.
-_OF_MODULE = ("aspect_ratio", "mass", "volume", "radius", "length", "rotor_inertia")
+_OF_MODULE = (
+    *("aspect_ratio", "mass", "volume", "radius", "length", "width", "height"),
+    "rotor_inertia",
+)
 _LINE = "available = peak_torque * (1 - |speed| / no_load_speed) when driving"
 _CORNERED = (
     "available = min(peak_torque, stall_torque * (1 - |speed| / no_load_speed)) when driving; "
