@@ -93,9 +93,9 @@ def test_servos_of_an_import_lie_along_their_links_and_away_from_the_first(tmp_p
             continue
         assert geom.form == "box"
         assert float(geom.center[2]) < float(body.link.tip[2])
-    assert "long: -z" in found.spec.files["tree.yaml"].read_text(encoding="utf-8")
-    modules = import_robot(urdf(tmp_path, 1, 60, 0.3), tmp_path / "modules").spec
-    assert "long" not in modules.files["tree.yaml"].read_text(encoding="utf-8")
+    assert "long: -z" in (tmp_path / "out" / "tree.yaml").read_text(encoding="utf-8")
+    import_robot(urdf(tmp_path, 1, 60, 0.3), tmp_path / "modules")
+    assert "long" not in (tmp_path / "modules" / "tree.yaml").read_text(encoding="utf-8")
 
 
 def test_the_pedestal_is_the_box_of_the_makers_base(tmp_path: Path) -> None:
