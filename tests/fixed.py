@@ -188,3 +188,39 @@ def planar(joints: int = 2, low: float = -3.0, high: float = 3.0) -> draft.Spec:
             "tree.yaml": {"chains": {"limb": chain}, "tree": tree},
         }
     )
+
+
+def servo_finger(long: str, spread: bool = False) -> draft.Spec:
+    """Two servos, 40 mm from each other, with a hinge between them about y.
+
+    Args:
+        long: direction in which the box of the first one extends, along z to the second one.
+        spread: whether the second one is beside the first one at the other end of the range.
+    """
+    chain = [
+        {"name": "housing", "motor": {"actuator": "servo", "axis": "y", "long": long}},
+        {
+            "name": "first",
+            "joint": {
+                **{"name": "bend_1", "axis": "y", "actuator": "servo"},
+                "range": [0, "pi / 2" if spread else 0.1],
+            },
+            "link": {"axis": "z", "length": 0.04, "mass": 0.01},
+            "motor": {"actuator": "servo", "axis": "y"},
+        },
+        {
+            "name": "second",
+            "joint": {"name": "bend_2", "axis": "y", "range": [0, 1], "actuator": "servo"},
+            "link": {"axis": "z", "length": 0.04, "mass": 0.01},
+        },
+    ]
+    parameters = {
+        **{"name": "servo_finger", "population": "humanoid", "parameters": {}},
+        "actuators": {"servo": {"like": "XC330-M288"}},
+    }
+    tree = {"name": "base", "type": "fixed", "at": [0, 0, 1], "children": [{"chain": "finger"}]}
+    files = {
+        "parameters.yaml": parameters,
+        "tree.yaml": {"chains": {"finger": chain}, "tree": tree},
+    }
+    return draft.Spec.parse(files)

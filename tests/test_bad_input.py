@@ -150,6 +150,15 @@ WORDS = {
     "number_for_a_mapping": said(PARAMETERS, "{value: 0.40", "0.40 #"),
     "short_vector": said(TREE, "at: [0, 0, -0.2]", "at: [0, 0]"),
     "unknown_axis": said(TREE, "axis: x, range", "axis: w, range"),
+    "long_side_along_the_axis": Mistake(
+        (
+            (PARAMETERS, "peak_torque: 60", "kind: servo\n    peak_torque: 6"),
+            (TREE, "actuator: leg, axis: y}", "actuator: leg, axis: y, long: -y}"),
+        )
+    ),
+    "long_side_of_a_cylinder": said(
+        TREE, "actuator: leg, axis: y}", "actuator: leg, axis: y, long: z}"
+    ),
     "axis_without_length": said(TREE, "axis: x, range", "axis: [0, 0, 0], range"),
     "unknown_type_of_link": said(TREE, "type: sphere", "type: shpere"),
     "unknown_segment": said(TREE, "segment: thigh", "segment: tigh"),

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from draft import geometry as g
-from draft.design.solids import SLACK, Ball, Cylinder, Solid, overlap
+from draft.design.solids import SLACK, Ball, Block, Cylinder, Solid, overlap
 from draft.geometry import Matrix, Vector
 from draft.values import Value
 
@@ -118,6 +118,47 @@ def test_a_mirrored_pair_overlaps_as_the_pair_does(
     mirror = ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
     mirrored = [_moved(solid, mirror, g.ZERO) for solid in pair]
     assert overlap(*mirrored) == overlap(*pair)
+
+
+def _block(rng: np.random.Generator) -> Block:
+    """A random box; half of them lie along the axes."""
+    roll, pitch, yaw = (float(v) for v in rng.uniform(-math.pi, math.pi, 3))
+    turn = g.IDENTITY if rng.random() < 0.5 else g.from_rpy(roll, pitch, yaw)
+    first, second, third = (g.rotate(turn, axis) for axis in g.IDENTITY)
+    x, y, z, *halves = (
+        float(v) for v in (*rng.uniform(-0.35, 0.35, 3), *rng.uniform(0.02, 0.3, 3))
+    )
+    return Block((x, y, z), (first, second, third), (halves[0], halves[1], halves[2]))
+
+
+@given(seeds, st.booleans())
+@settings(max_examples=150)
+def test_boxes_overlap_where_mujoco_finds_them_to(seed: int, round_: bool) -> None:
+    """A box and a box, or a box and a cylinder, that are not within the slack of touching."""
+    rng = np.random.default_rng(seed)
+    while True:
+        a, b = _block(rng), _solid(rng, Cylinder) if round_ else _block(rng)
+        spec = mujoco.MjSpec()
+        for each in (a, b):
+            body = spec.worldbody.add_body(pos=[float(x) for x in each.center])
+            if isinstance(each, Block):
+                turn = g.transposed(each.edges)
+                body.add_geom(
+                    type=mujoco.mjtGeom.mjGEOM_BOX, size=each.halves, quat=g.quaternion(turn)
+                )
+            elif isinstance(each, Cylinder):
+                quat = np.empty(4)
+                mujoco.mju_quatZ2Vec(quat, np.array(each.axis))
+                size = (float(each.radius), float(each.half), 0)
+                body.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size, quat=quat.tolist())
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        distance = mujoco.mj_geomDistance(model, data, 0, 1, 10.0, None)
+        if abs(distance) > 1.001 * SLACK * (a.reach + b.reach):
+            break
+    assert overlap(a, b) == (distance < 0)
+    assert overlap(b, a) == (distance < 0)
 
 
 def _stacked(solids: Sequence[Solid]) -> Solid:

@@ -81,6 +81,23 @@ def test_a_machine_without_legs_is_imported_on_a_fixed_base(
     assert segment in said[0]
 
 
+def test_servos_of_an_import_lie_along_their_links_and_away_from_the_first(tmp_path: Path) -> None:
+    """A limb upwards: the box in the base points down, and others back along their links."""
+    found = import_robot(urdf(tmp_path, 3, 1, 0.04), tmp_path / "out")
+    design = found.spec.resolve()
+    boxes = {body.name: geom for body in design.bodies if (geom := body.motor_geom) is not None}
+    assert len(boxes) == 9
+    for body in design.bodies:
+        geom = boxes.get(body.name)
+        if geom is None:
+            continue
+        assert geom.form == "box"
+        assert float(geom.center[2]) < float(body.link.tip[2])
+    assert "long: -z" in (tmp_path / "out" / "tree.yaml").read_text(encoding="utf-8")
+    import_robot(urdf(tmp_path, 1, 60, 0.3), tmp_path / "modules")
+    assert "long" not in (tmp_path / "modules" / "tree.yaml").read_text(encoding="utf-8")
+
+
 def test_the_pedestal_is_the_box_of_the_makers_base(tmp_path: Path) -> None:
     file = urdf(tmp_path, 1, 60, 0.3)
     beside = file.read_text().replace("<visual>", '<visual><origin xyz="0.2 -0.1 0.05"/>')

@@ -122,5 +122,7 @@ def test_every_quantity_of_a_sized_class_has_a_law_above_its_inputs() -> None:
             assert set(quantity.law.inputs) <= above
         above.add(name)
     sized = draft.load("quadruped").resolve().actuators["leg"]
-    assert set(QUANTITIES) - set(sized.quantities) == {"corner_speed", "stall_torque"}
-    assert {*QUANTITIES} - {*STATED} == {"volume", "stall_torque"}
+    assert set(QUANTITIES) - set(sized.quantities) == {
+        *("corner_speed", "stall_torque", "width", "height"),
+    }
+    assert {*QUANTITIES} - {*STATED} == {"volume", "stall_torque", "width", "height"}

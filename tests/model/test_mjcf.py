@@ -61,8 +61,9 @@ def test_drawn_size_and_place_of_every_actuator_are_the_designs(model: draft.Mod
     for body in model.design.bodies:
         if body.actuator is None:
             continue
-        geom = model.mujoco.geom(f"{body.name}_motor")
-        assert geom.size[:2] == pytest.approx([body.actuator.radius, body.actuator.length / 2])
+        geom, a = model.mujoco.geom(f"{body.name}_motor"), body.actuator
+        sizes = [a.height / 2, a.width / 2] if a.is_box else [a.radius]
+        assert geom.size[: len(sizes) + 1] == pytest.approx([*sizes, a.length / 2])
         z = np.empty(3)
         mujoco.mju_rotVecQuat(z, np.array([0.0, 0.0, 1.0]), geom.quat)
         assert body.link.motor is not None

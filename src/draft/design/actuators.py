@@ -11,9 +11,10 @@ import numpy as np
 from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
-from draft.laws.catalogue import Part
+from draft.laws.catalogue import SERVO, Part
 from draft.laws.limits import copper_loss
 from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantities
+from draft.laws.servos import usual_face_ratio
 from draft.laws.torque_speed import Line, stall_torque, torque_speed
 from draft.values import (
     Value,
@@ -121,8 +122,20 @@ class Actuator(Quantities):
     def copper_loss(self) -> Value:
         """Heat of the motor per torque squared [W/(N m)^2], see `draft.laws.limits`."""
         line = self.peak_torque, self.no_load_speed, self.corner_speed
-        surface = 2.0 * PI * self.radius * (self.radius + self.length)
-        return copper_loss(*line, self.rated_torque, surface)
+        return copper_loss(*line, self.rated_torque, self.surface)
+
+    @property
+    def is_box(self) -> bool:
+        """Whether it is a box, as servos are; else a cylinder."""
+        return self.kind == SERVO
+
+    @property
+    def surface(self) -> Value:
+        """Surface of its box or cylinder [m2]."""
+        if self.is_box:
+            around = self.width + self.height
+            return 2.0 * (self.width * self.height + around * self.length)
+        return 2.0 * PI * self.radius * (self.radius + self.length)
 
     def through(self, ratio: Value, efficiency: Value) -> Actuator:
         """The actuator as a joint sees it behind a transmission.
@@ -322,6 +335,7 @@ def size(
     _drive(sizer, name, where, by_trend)
     sizer.rated()
     _envelope(sizer)
+    _edges(sizer)
     for quantity, line in QUANTITIES.items():
         if isinstance(line.law, Identity):
             sizer.follow([(quantity, line.law)])
@@ -426,3 +440,22 @@ def _envelope(s: _Sizer) -> None:
             s.measured("radius")
             s.measured("length")
     s.follow(_CYLINDER)
+
+
+def _edges(s: _Sizer) -> None:
+    """Derive the edges across the axis; only those of a box have an origin of their own."""
+    radius = s.value["radius"]
+    if s.laws.kind != SERVO:
+        s.value["width"] = s.value["height"] = 2.0 * radius
+        return
+    own = s.part.face_ratio if s.part is not None else None
+    ratio = usual_face_ratio() if own is None else own
+    of_radius = s.origin["radius"]
+    printed = own is not None and of_radius.kind == "catalogue"
+    for edge, share in (("width", 1.0 / ratio), ("height", ratio)):
+        s.value[edge] = math.sqrt(PI * share) * radius
+        s.origin[edge] = of_radius if printed else Origin("derived", _FACE, None, ("radius",))
+
+
+# The longer edge is the usual multiple of the shorter one, or that of the part.
+_FACE = "width height = pi r^2"

@@ -89,7 +89,11 @@ class Body(NamedTuple):
     def motor_geom(self) -> Geom | None:
         """Its actuator as a solid."""
         motor, a = self.link.motor, self.actuator
-        return None if motor is None or a is None else motor.geom(a.radius, a.length, a.mass)
+        if motor is None or a is None:
+            return None
+        if a.is_box:
+            return motor.box(a.width, a.height, a.length, a.mass)
+        return motor.cylinder(a.radius, a.length, a.mass)
 
     @property
     def end_geom(self) -> Geom | None:

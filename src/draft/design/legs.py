@@ -308,6 +308,6 @@ def _first_moment(body: Body) -> Vector:
     moment = g.scale(link.tip, body.member_mass * body.member_centre + body.end_mass)
     if link.end is not None and link.end.center is not g.ZERO:
         moment = g.add(moment, g.scale(link.end.center, body.end_mass))
-    if link.motor is not None and body.actuator is not None:
-        moment = g.add(moment, g.scale(link.motor.center, body.actuator.mass))
+    if (motor := body.motor_geom) is not None and motor.mass is not None:
+        moment = g.add(moment, g.scale(motor.center, motor.mass))
     return moment

@@ -11,7 +11,7 @@ from draft.design.design import Body, Design
 from draft.design.findings import Finding, note
 from draft.design.parts import Joint
 from draft.design.plan import Consecutive, Plan
-from draft.design.solids import Box, Pose, Solid
+from draft.design.solids import Box, Cylinder, Pose, Solid
 from draft.geometry import Frame, Vector
 from draft.values import Mask, Value, both, clip, every, some
 
@@ -77,7 +77,7 @@ def _frames(pair: Consecutive, path: Sequence[Body], by: Value) -> list[Frame]:
 def _turns_in_place(a: Solid, pair: Consecutive, path: Sequence[Body]) -> bool:
     """Whether the first actuator is a body of revolution about the axis of the hinge."""
     joint = _joint(pair, path)
-    if joint is None or pair.joint is None or joint.slide:
+    if joint is None or pair.joint is None or joint.slide or not isinstance(a, Cylinder):
         return False
     origin, rotation = _frames(pair, path, 0.0)[pair.joint]
     axis = g.rotate(rotation, joint.axis)

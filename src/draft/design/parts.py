@@ -129,17 +129,17 @@ def read_link(link: links.Link, r: Evaluator) -> Link:
     """Evaluate a link.
 
     Raises:
-        ResolveError: a length is not positive, a joint range is empty, an axis is zero, or a wheel
-            does not turn about its own axis.
+        ResolveError: a length is not positive, a joint range is empty, an axis is zero, a wheel
+            does not turn about its own axis, or a motor's long side is along its axis.
     """
     name = link.name
     member = motor = pulley = end = None
-    tip = g.ZERO
+    tip = along = g.ZERO
     if link.member is not None:
         member = MemberPart.read(link.member, name, r)
-        tip = g.scale(member.axis, member.length)
+        along, tip = member.axis, g.scale(member.axis, member.length)
     if link.motor is not None:
-        motor = MotorPart.read(link.motor, name, tip, r)
+        motor = MotorPart.read(link.motor, name, along, tip, r)
     if link.pulley is not None:
         pulley = PulleyPart.read(link.pulley, name, r)
     joint = _joint(link.joint, r) if link.joint is not None else None

@@ -40,6 +40,7 @@ from draft.laws.structure import MIDDLE
 from draft.spec import Spec, tree
 from draft.spec.evaluate import Evaluator
 from draft.spec.expressions import Expression
+from draft.spec.links import Link as WrittenLink
 from draft.spec.payload import PLACE
 from draft.spec.primitives.loft import Loft
 from draft.spec.primitives.root import TrunkPart, make_trunk
@@ -370,6 +371,7 @@ class _Resolver:
         for i, written in enumerate(spec.bodies):
             link = skeleton.links[i]
             actuator = self.actuators[link.motor.actuator] if link.motor else None
+            self.check_long(written.link, actuator)
             end, middle, label = shared.get(i, (0.0, MIDDLE, None))
             if link.end is not None and not link.end.of_segment and link.end.mass is not None:
                 end = link.end.mass
@@ -401,6 +403,20 @@ class _Resolver:
             follow = partial(coupled, name=name, body=k)
             own[i] = reuse.result(("coupled", i), follow, own[i], own[k])
         return Skeleton(spec, p, own, places)
+
+    def check_long(self, link: WrittenLink, actuator: Actuator | None) -> None:
+        """Check that a stated long side is that of a box."""
+        if link.motor is None or actuator is None or actuator.is_box:
+            return
+        if link.motor.fields.long is not None:
+            raise ResolveError(
+                Problem(
+                    f"the motor of {link.name} states its long side, and actuator "
+                    f"'{actuator.name}' is a cylinder",
+                    link.motor.places["long"],
+                    "remove 'long', or give the class 'kind: servo'",
+                )
+            )
 
     def check_moving_masses(self, bodies: list[Body]) -> None:
         """Check that every joint moves a mass; the dynamics is singular otherwise."""

@@ -137,7 +137,8 @@ def solid(geom: Geom, frame: Frame) -> Solid:
     if geom.form == "sphere":
         return Ball(at, geom.size[0])
     x, y, z = geom.size
-    first, second, third = (g.rotate(rotation, axis) for axis in g.IDENTITY)
+    turn = g.compose(rotation, geom.rotation)
+    first, second, third = (g.rotate(turn, axis) for axis in g.IDENTITY)
     return Block(at, (first, second, third), g.scale((x, y, z), 0.5))
 
 
@@ -203,18 +204,23 @@ def overlap(a: Solid, b: Solid) -> Mask:
 
 def _directions(a: Solid, b: Solid, c: Vector) -> list[Vector]:
     """Unit directions that separate nearly all pairs that can be separated."""
-    candidates = [a.axis, b.axis]
+    candidates = [*_normals(a), *_normals(b)]
     for raw in (
         c,
         g.subtract(c, g.scale(a.axis, g.dot(c, a.axis))),
         g.subtract(c, g.scale(b.axis, g.dot(c, b.axis))),
-        g.cross(a.axis, b.axis),
+        *(g.cross(u, v) for u in _normals(a) for v in _normals(b)),
     ):
         size = g.norm(raw)
         if some(size > _SHORT):
             # A shorter vector stays shorter than a unit vector, and separates nothing.
             candidates.append(g.scale(raw, 1.0 / maximum(size, _SHORT)))
     return candidates
+
+
+def _normals(solid: Solid) -> tuple[Vector, ...]:
+    """Normals of its flat faces: with their products, they part any two boxes that are apart."""
+    return solid.edges if isinstance(solid, Block) else (solid.axis,)
 
 
 def _separated(a: Solid, b: Solid) -> Mask:

@@ -16,7 +16,7 @@ from draft.imports.anatomy import ROLLING, WHEEL, run
 from draft.imports.attachments import Attachments, opposite, side_of
 from draft.imports.bends import held_bends
 from draft.imports.ends import FINGER, Node
-from draft.imports.formatting import Parameters, Record, along, direction, vector
+from draft.imports.formatting import NAMED, Parameters, Record, along, direction, vector
 from draft.imports.home import home_pose
 from draft.imports.knees import Knees
 from draft.imports.motors import Motor
@@ -26,6 +26,7 @@ from draft.imports.symmetry import Copy, families, groups
 from draft.imports.trunk import trunk_name
 from draft.imports.volumes import Volumes
 from draft.laws import structure
+from draft.laws.catalogue import SERVO
 from draft.values import Array
 
 CHAINS = {
@@ -38,6 +39,7 @@ CHAINS = {
 }
 INSTEAD = {"ankle_link": "foot", "neck_link": "head", "knee_link": "shank", "elbow_link": "forearm"}
 OTHER = "other"
+BESIDE = 0.003  # What lies nearer to the axis of a hinge gives no direction [m].
 
 
 @dataclass
@@ -76,6 +78,7 @@ class Writer:
         self.population, self.knees, self.cranks = population, knees, cranks or {}
         self.volumes = volumes
         self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
+        self.servos = {joint for one in motors if one.kind == SERVO for joint in one.joints}
         self.known = set(structure.population(population).segments) - {OTHER}
         self.link_class = link_class  # of all links of a machine without legs; "" by their kinds
         self.links = names.Unique([trunk_name(reduced)])
@@ -283,7 +286,20 @@ class Writer:
         if body.role == "abduction":
             inward = -float(np.sign(body.anchor @ body.axis)) * body.axis
             motor["shift"] = along(inward, f"{self.drive(body)}.length / 2")
-        return {"name": f"{name}_housing", "motor": motor}
+        return {"name": f"{name}_housing", "motor": motor | self.away(body)}
+
+    def away(self, body: Body) -> Node:
+        """Direction of the box of a servo that no member holds: away from what its hinge moves.
+
+        Empty for a module, and where nothing beyond the hinge lies across its axis.
+        """
+        ways = (one.anchor - body.anchor for one in run(body))
+        beyond = [way - (way @ body.axis) * body.axis for way in ways]
+        far = [way for way in beyond if np.linalg.norm(way) > BESIDE]
+        if not far or body.joint is None or body.joint.name not in self.servos:
+            return {}
+        nearest = min(NAMED, key=lambda named: float(far[-1] @ named))
+        return {"long": NAMED[nearest]}
 
     def joint(self, body: Body, name: str, home: float, own: Mapping[str, str]) -> Node:
         """Joint of a link; `own`: names of the joints of its chain by those of the maker."""
@@ -327,7 +343,7 @@ class Writer:
         if below.merged:
             if np.any(way):
                 motor["shift"] = vector(way)
-            node["motor"] = motor
+            node["motor"] = motor | self.away(below)
             return
         if below.role == "knee" and self.remote(body):
             motor["shift"] = along(self.inward(below), f"{self.drive(below)}.length / 2")

@@ -30,7 +30,9 @@ class Part:
     source publishes them; `rated_torque` also where the only source describes another version.
     `corner_speed`, the highest speed with full peak torque, is known of a few.
     `rated_source` is the source of the rated torque, `doubt` what a source contradicts in this row,
-    and `where` its file and line.
+    and `where` its file and line. A servo is a box: its `radius` is that of a circle of the area of
+    its face across the axis, whose longer edge is `face_ratio` times its shorter one; the face of a
+    module is round, and has none.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Part:
     note: str
     doubt: str
     where: Location
+    face_ratio: float | None = None
 
     @property
     def aspect_ratio(self) -> float:

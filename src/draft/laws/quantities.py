@@ -115,9 +115,29 @@ class Quantities:
     volume: Value = _line(
         "m3", "volume", "Volume of the enclosing cylinder [m3].", shown=("cm³", 1e6), **_READ_ONLY
     )
-    radius: Value = _line("m", "radius", "Radius of the module [m].", shown=("mm", 1e3))
+    radius: Value = _line(
+        "m",
+        "radius",
+        "Radius of the module [m]; of a servo, that of a circle of the area of its box across the "
+        "axis.",
+        shown=("mm", 1e3),
+    )
     length: Value = _line(
         "m", "length", "Length of the module along its axis [m].", shown=("mm", 1e3)
+    )
+    width: Value = _line(
+        "m",
+        "width",
+        "Shorter edge across the axis of the box of a servo [m]; twice the radius of a module.",
+        shown=("mm", 1e3),
+        stated=False,
+    )
+    height: Value = _line(
+        "m",
+        "height",
+        "Longer edge across the axis of the box of a servo [m]; twice the radius of a module.",
+        shown=("mm", 1e3),
+        stated=False,
     )
     rotor_inertia: Value = _line(
         "kg m2",

@@ -2,7 +2,12 @@
 
 Their laws are of their own: below the weakest module of the catalogue, 4.1 N m, its laws give two
 to eleven times the mass of a servo. Sizes are those of the box: `length` is its edge along the
-output axis, and `radius` that of a circle of the area of the other two.
+output axis, and `radius` that of a circle of the area of the other two. The ratio of these two is
+that of the part, or the median of all servos.
+
+Where the axis of the output horn crosses that face is in no table. It is taken to lie in the middle
+of the shorter edge, and half of the shorter edge from one end of the longer: as far from the end as
+from both sides. That is an assumption.
 """
 
 from __future__ import annotations
@@ -14,6 +19,7 @@ import re
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from statistics import median
 
 from draft.errors import Location
 from draft.laws.actuators import Laws, laws_of
@@ -53,6 +59,12 @@ def servo_laws() -> Laws:
     return replace(laws_of(SERVO, record), kind=SERVO)
 
 
+@lru_cache(maxsize=1)
+def usual_face_ratio() -> float:
+    """Longer over shorter edge of the face across the axis: the median of all servos."""
+    return median(part.face_ratio for part in servos().values() if part.face_ratio is not None)
+
+
 def _part(row: dict[str, str], line: int) -> Part:
     def known(column: str) -> float | None:
         return float(row[column]) if row[column] else None
@@ -77,4 +89,5 @@ def _part(row: dict[str, str], line: int) -> Part:
         note=row["note"],
         doubt="",
         where=Location(str(FILE), line),
+        face_ratio=max(long, wide) / min(long, wide),
     )

@@ -264,18 +264,19 @@ def _parts(body: Body) -> Iterator[Element]:
 
 def _geom(body: str, geom: Geom) -> Element:
     """Geom with the density that gives its mass; a geom without mass has none."""
-    form, size = geom.form, geom.size
+    form, size, quat = geom.form, geom.size, None
     if form == "cylinder":
-        size = (size[0], size[1] / 2)
+        size, quat = (size[0], size[1] / 2), _toward(geom.axis)
     elif form == "box":
         size = tuple(side / 2 for side in size)
+        quat = None if geom.rotation is None else g.quaternion(geom.rotation)
     return Element(
         "geom",
         name=body + geom.suffix,
         class_=geom.kind,
         type=None if FORMS.get(geom.kind) == form else form,
         pos=geom.center,
-        quat=_toward(geom.axis) if form == "cylinder" else None,
+        quat=quat,
         size=size,
         density=None if geom.mass is None else geom.mass / geom.volume,
         mass=0 if geom.mass is None and geom.kind != "drawn" else None,

@@ -31,7 +31,10 @@ TRUNK = "meshes/trunk.stl"
 _NO_LIMIT = 1000.0
 _GIMBAL = 1e-9
 # Quantities of a module that its joint has under another name, or does not show.
-_OF_MODULE = ("aspect_ratio", "mass", "volume", "radius", "length", "rotor_inertia")
+_OF_MODULE = (
+    *("aspect_ratio", "mass", "volume", "radius", "length", "width", "height"),
+    "rotor_inertia",
+)
 _FOLLOWS = ("joint", "ratio", "offset")  # What is told of a joint that follows another.
 # Torque over speed of an actuator that drives its joint, in the table of the actuators.
 _LINE = "available = peak_torque * (1 - |speed| / no_load_speed) when driving"

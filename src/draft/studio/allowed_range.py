@@ -16,7 +16,7 @@ def allowed(finding: Finding, design: Design) -> tuple[float, float] | None:
     population = plan(design.spec).population
     usual = float(finding.limit) if isinstance(finding.limit, (int, float)) else math.nan
     if finding.id == "aspect_ratio":
-        return aspect_range()
+        return aspect_range(plan(design.spec).own, design.actuators[finding.where].kind)
     if finding.id == "actuator_share":
         return population.share[0], population.share[2]
     if finding.id == "total_mass":

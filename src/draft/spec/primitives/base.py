@@ -28,7 +28,7 @@ import pydantic
 
 from draft import geometry as g
 from draft.errors import Location
-from draft.geometry import Vector
+from draft.geometry import Rotation, Vector
 from draft.spec.evaluate import Evaluator
 from draft.spec.expressions import Expression, Triple, parse
 from draft.spec.field_types import Model, NamedAxis, Number, broken_rule
@@ -177,11 +177,12 @@ class Geom(NamedTuple):
         kind: part of the robot, such as "actuator", which determines its colour.
         form: its shape.
         center: its centre [m].
-        size: radius and length of a cylinder, radius of a sphere, full sizes of a box along the
-            body's x, y and z [m].
+        size: radius and length of a cylinder, radius of a sphere, full sizes of a box along its own
+            x, y and z [m].
         mass: its mass [kg]; None if it is only drawn and occupies no space.
         axis: unit direction of a cylinder.
         collides: whether it collides with the floor and with objects.
+        rotation: frame of a box in that of the body; None for parallel frames.
     """
 
     suffix: str
@@ -192,6 +193,7 @@ class Geom(NamedTuple):
     mass: Value | None
     axis: Vector = (0.0, 0.0, 1.0)
     collides: bool = True
+    rotation: Rotation = None
 
     @property
     def volume(self) -> Value:
@@ -209,7 +211,7 @@ class Geom(NamedTuple):
     def inertia(self) -> Vector:
         """Principal moments about its centre [kg m2].
 
-        About x, y and z for a box; for a cylinder the last is about its axis.
+        About its own x, y and z for a box; for a cylinder the last is about its axis.
         """
         mass = 0.0 if self.mass is None else self.mass
         if self.form == "cylinder":

@@ -5,17 +5,18 @@ The other primitives add an end at the tip of the link.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, get_args
 
 from pydantic import Discriminator, Field, Tag
 
 from draft import geometry as g
+from draft.errors import Problem, ResolveError
 from draft.geometry import Vector
 from draft.spec.evaluate import Evaluator
 from draft.spec.field_types import Axis, Model, Name, Number, NumberVector
 from draft.spec.primitives.base import End, Geom, Written
-from draft.values import Value
+from draft.values import Value, every, is_array, maximum, some, where
 
 if TYPE_CHECKING:
     from draft.spec.schema import Node
@@ -200,42 +201,127 @@ class MemberPart(NamedTuple):
 class Motor(Model):
     """An actuator fixed to the tip of a link.
 
-    It drives the next joint down the tree that uses its class and has no other actuator.
+    It drives the next joint down the tree that uses its class and has no other actuator. A module
+    is a cylinder about its axis. A servo is a box whose axis is near one end of it: half of its
+    shorter edge across the axis from that end.
     """
 
     actuator: Name
     """Actuator class."""
     axis: Axis
-    """Direction of its cylinder."""
+    """Direction of its output axis."""
     shift: NumberVector | None = None
-    """Centre of the cylinder from the link's tip [m]."""
+    """Middle of the actuator on its axis, from the link's tip [m]."""
+    long: Axis | None = None
+    """Direction in which the box of a servo extends from its axis, in the link's frame: the part
+    of it across the axis counts. Default: back along the member; without one across the axis, -z,
+    or -x if the axis is along z."""
 
 
 class MotorPart(NamedTuple):
-    """An actuator's cylinder: centre in the link's frame [m] and unit axis."""
+    """An actuator on its axis: middle in the link's frame [m], unit axis, and unit vector across.
+
+    A cylinder is about the axis; a box extends from it along `long`.
+    """
 
     actuator: str
     axis: Vector
     center: Vector
+    long: Vector
 
     @classmethod
-    def read(cls, written: Written[Motor], link: str, tip: Vector, r: Evaluator) -> MotorPart:
-        """Evaluate the axis and the centre; `tip` is the tip of the link [m]."""
+    def read(
+        cls, written: Written[Motor], link: str, member: Vector, tip: Vector, r: Evaluator
+    ) -> MotorPart:
+        """Evaluate the axes and the middle.
+
+        Args:
+            written: the motor as written.
+            link: name of its link, for messages.
+            member: direction of the member of the link; zero without one.
+            tip: tip of the link [m].
+            r: evaluator of expressions.
+
+        Raises:
+            ResolveError: a number is invalid, or `long` is along the axis.
+        """
         center = tip
         if "shift" in written.numbers:
             center = g.add(tip, r.vector(written.triple("shift")))
         axis = r.axis(written.triple("axis"), f"the motor of {link}")
-        return cls(written.fields.actuator, axis, center)
+        if "long" in written.numbers:
+            long = r.axis(written.triple("long"), f"the long side of the motor of {link}")
+            _require_across(written, link, long, axis, r)
+            directions = [long]
+        else:
+            directions = [_REAR, _DOWN, g.scale(member, -1.0)]
+        return cls(written.fields.actuator, axis, center, _last_across(directions, axis))
 
     def mirrored(self, signs: Vector) -> MotorPart:
         """Return its reflection."""
         axis, center = g.reflect(self.axis, signs), g.reflect(self.center, signs)
-        return MotorPart(self.actuator, axis, center)
+        return MotorPart(self.actuator, axis, center, g.reflect(self.long, signs))
 
-    def geom(self, radius: Value, length: Value, mass: Value) -> Geom:
-        """Return the module as a cylinder of a radius [m], length [m] and mass [kg]."""
+    def cylinder(self, radius: Value, length: Value, mass: Value) -> Geom:
+        """Return a module as a cylinder of a radius [m], length [m] and mass [kg]."""
         size = (radius, length)
         return Geom("_motor", "actuator", "cylinder", self.center, size, mass, self.axis)
+
+    def box(self, width: Value, height: Value, length: Value, mass: Value) -> Geom:
+        """Return a servo as a box, whose x is along its long side and whose z is along its axis.
+
+        Args:
+            width: shorter edge across the axis [m].
+            height: longer edge across the axis [m].
+            length: edge along the axis [m].
+            mass: its mass [kg].
+        """
+        center = g.add(self.center, g.scale(self.long, (height - width) / 2))
+        rotation = g.transposed((self.long, g.cross(self.axis, self.long), self.axis))
+        size = (height, width, length)
+        return Geom("_motor", "actuator", "box", center, size, mass, rotation=rotation)
+
+
+_DOWN: Vector = (0.0, 0.0, -1.0)
+_REAR: Vector = (-1.0, 0.0, 0.0)
+# Sine of the angle to the axis below which a direction counts as along it.
+_ALONG = 1e-6
+
+
+def _across(direction: Vector, axis: Vector) -> Vector:
+    """Part of a direction across a unit axis."""
+    return g.subtract(direction, g.scale(axis, g.dot(direction, axis)))
+
+
+def _last_across(directions: Iterable[Vector], axis: Vector) -> Vector:
+    """Unit vector across an axis: the part of the last direction that is not along it."""
+    found = g.ZERO
+    for direction in directions:
+        part = _across(direction, axis)
+        size = g.norm(part)
+        off = size > _ALONG
+        if not some(off):
+            continue
+        unit = g.scale(part, 1.0 / maximum(size, _ALONG))
+        if every(off):
+            found = unit
+        else:
+            x, y, z = (where(off, a, b) for a, b in zip(unit, found, strict=True))
+            found = (x, y, z)
+    return found
+
+
+def _require_across(
+    written: Written[Motor], link: str, long: Vector, axis: Vector, r: Evaluator
+) -> None:
+    along = g.norm(_across(long, axis)) <= _ALONG
+    if is_array(along):
+        r.mark(along)
+    elif along:
+        other = "x" if abs(axis[2]) > abs(axis[0]) else "z"
+        cause = f"'long' of the motor of {link} is along the motor's axis"
+        remedy = f"give a direction across it, such as 'long: {other}', or omit 'long'"
+        raise ResolveError(Problem(cause, written.places["long"], remedy))
 
 
 class Pulley(Model):
