@@ -92,3 +92,16 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(DraftError, match=r"cannot write .*mine.*\n  choose another place"):
         new_robot(tmp_path / "file" / "mine", "quadruped")
+
+
+def test_a_robot_in_the_current_folder_comes_before_a_shipped_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "biped").mkdir()
+    assert draft.load("biped").folder != Path("biped")  # An empty folder is no robot.
+    (tmp_path / "biped").rmdir()
+    new_robot(tmp_path / "mine", "hand").rename("biped")
+    assert draft.load("biped").folder == Path("biped")
+    assert not draft.load("biped").floating
+    assert draft.load("hand").folder != Path("hand")

@@ -77,12 +77,14 @@ def shipped() -> tuple[str, ...]:
 def find(robot: str | Path) -> Path:
     """Folder of a robot, by the name of a shipped one or by its path.
 
+    A robot in a folder of the current one comes before a shipped one of that name.
+
     Raises:
         SpecError: it is neither a shipped robot nor a folder.
     """
-    if isinstance(robot, str) and robot in FOLDERS:
-        return FOLDERS[robot]
     folder = Path(robot)
+    if isinstance(robot, str) and robot in FOLDERS and not os.path.isfile(folder / FILES[0]):
+        return FOLDERS[robot]
     if not str(robot).strip():
         remedy = suggest("", shipped(), "shipped robots") + "; '.' is the current folder"
         raise SpecError("no robot is named", remedy)
@@ -106,8 +108,8 @@ def load(robot: str | Path) -> Spec:
         Spec('quadruped', 14 parameters, 1 actuator class, 12 joints, 3 named designs)
 
     Args:
-        robot: name of a shipped robot, or path of a folder with `parameters.yaml`, `tree.yaml` and,
-            unless its base is fixed, `root.yaml`.
+        robot: path of a folder with `parameters.yaml`, `tree.yaml` and, unless its base is fixed,
+            `root.yaml`, or name of a shipped robot. A folder of that name comes first.
 
     Raises:
         SpecError: listing every problem found, each with file, line and column.
