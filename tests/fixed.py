@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
+
+import mujoco
 
 import draft
 
@@ -224,3 +227,12 @@ def servo_finger(long: str, spread: bool = False) -> draft.Spec:
         "tree.yaml": {"chains": {"finger": chain}, "tree": tree},
     }
     return draft.Spec.parse(files)
+
+
+def posed(model: mujoco.MjModel, positions: Mapping[str, float]) -> mujoco.MjData:
+    """Data of a model at rest, with joints at positions [rad or m] by name and others at zero."""
+    data = mujoco.MjData(model)
+    for name, position in positions.items():
+        data.qpos[model.joint(name).qposadr[0]] = position
+    mujoco.mj_forward(model, data)
+    return data

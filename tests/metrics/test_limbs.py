@@ -35,18 +35,9 @@ def value(design: draft.Design, name: str) -> float:
     return scalar(of_design(design, [name])[name])
 
 
-def posed(model: mujoco.MjModel, angles: dict[str, float]) -> mujoco.MjData:
-    """Data of a model with joints at angles, at rest."""
-    data = mujoco.MjData(model)
-    for name, angle in angles.items():
-        data.qpos[model.joint(name).qposadr[0]] = angle
-    mujoco.mj_forward(model, data)
-    return data
-
-
 def at_home(model: draft.Model) -> mujoco.MjData:
     joints = model.design.joints
-    return posed(model.mujoco, {name: scalar(joint.home) for name, joint in joints.items()})
+    return fixed.posed(model.mujoco, {name: scalar(joint.home) for name, joint in joints.items()})
 
 
 def site_jacobian(model: mujoco.MjModel, data: mujoco.MjData, site: str) -> Array:
@@ -146,7 +137,7 @@ def test_a_body_of_the_payload_at_the_tip_takes_the_limiting_torque(name: str) -
     load.explicitinertial = True
     model = text.compile()
     angles = {x.joint.names[0]: scalar(x.joint.angle) for x in stretch.loads}
-    data = posed(model, angles)
+    data = fixed.posed(model, angles)
     torque = {name: abs(data.joint(name).qfrc_bias[0]) for name in angles}
     kind = name.removeprefix("payload_") + "_torque"
     strength = {x.joint.names[0]: scalar(getattr(x.actuator, kind)) for x in stretch.loads}

@@ -107,14 +107,6 @@ def gradient(model: mujoco.MjModel, design: draft.Design, free: dict[str, float]
     return rows
 
 
-def posed(model: mujoco.MjModel, positions: dict[str, float]) -> mujoco.MjData:
-    data = mujoco.MjData(model)
-    for name, position in positions.items():
-        data.qpos[model.joint(name).qposadr[0]] = position
-    mujoco.mj_forward(model, data)
-    return data
-
-
 # --- where the joints are ------------------------------------------------------------------
 
 
@@ -194,7 +186,7 @@ def test_the_energy_of_a_coupled_motion_is_that_of_its_mass_matrix(
     design, compiled = model.design, model.mujoco
     compiled.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     free = {name: angle for name, joint in design.joints.items() if joint.follows is None}
-    data = posed(compiled, follow(design, free))
+    data = fixed.posed(compiled, follow(design, free))
     moving = gradient(compiled, design, free)
     velocity = speed * np.arange(1.0, len(free) + 1.0)
     data.qvel[:] = moving @ velocity
@@ -217,7 +209,7 @@ def test_a_coupled_finger_weighs_what_a_tendon_of_mujoco_makes_it_weigh() -> Non
     wired = element.compile()
     pose = {name: scalar(joint.home) for name, joint in model.design.joints.items()}
     plain = pose_inertia(model, pose, []).inertia[0]
-    data = posed(wired, pose)
+    data = fixed.posed(wired, pose)
     full = np.empty((wired.nv, wired.nv))
     mujoco.mj_fullM(wired, data, full)
     moving = gradient(wired, model.design, {n: p for n, p in pose.items() if "proximal" in n})
@@ -290,7 +282,7 @@ def test_a_joint_carries_what_its_followers_move() -> None:
     compiled = design.build().mujoco
     pose = {name: scalar(joint.home) for name, joint in design.joints.items()}
     free = {name: p for name, p in pose.items() if "proximal" in name}
-    bias = gradient(compiled, design, free).T @ posed(compiled, pose).qfrc_bias
+    bias = gradient(compiled, design, free).T @ fixed.posed(compiled, pose).qfrc_bias
     found = {joint.names[0]: GRAVITY * scalar(joint.hang) for joint in held_joints(design)}
     assert found == pytest.approx(dict(zip(free, bias, strict=True)), rel=1e-6)
 
@@ -301,7 +293,7 @@ def test_a_slide_that_follows_a_hinge_is_lifted_by_it() -> None:
     compiled = design.build().mujoco
     pose = {name: scalar(joint.home) for name, joint in design.joints.items()}
     free = {name: pose[name] for name in ("joint_0", "joint_1")}
-    bias = gradient(compiled, design, free).T @ posed(compiled, pose).qfrc_bias
+    bias = gradient(compiled, design, free).T @ fixed.posed(compiled, pose).qfrc_bias
     found = [GRAVITY * scalar(joint.hang) for joint in held_joints(design)]
     assert found == pytest.approx(list(bias), rel=1e-6)
 
@@ -311,7 +303,7 @@ def test_the_tip_of_a_coupled_finger_moves_with_both_joints(share: float) -> Non
     design = coupled_hand().resolve({"share": share})
     compiled = design.build().mujoco
     pose = {name: scalar(joint.home) for name, joint in design.joints.items()}
-    data = posed(compiled, pose)
+    data = fixed.posed(compiled, pose)
     moving = gradient(compiled, design, {n: p for n, p in pose.items() if "proximal" in n})
     fingers = ("index", "middle", "ring", "thumb")
     for i, (finger, limb) in enumerate(zip(fingers, limbs(design).fingers, strict=True)):
@@ -330,7 +322,7 @@ def test_poses_of_a_grasp_keep_the_coupling() -> None:
     names = [name for name, joint in design.joints.items() if joint.follows is None]
     for a, b in itertools.product(np.linspace(-0.2, 1.6, 60), repeat=2):
         free = dict.fromkeys(names, 0.0) | {"middle_proximal": a, "thumb_proximal": b}
-        data = posed(compiled, follow(design, free))
+        data = fixed.posed(compiled, follow(design, free))
         away = data.site("middle_tip").xpos - data.site("thumb_tip").xpos
         gap = min(gap, float(np.linalg.norm(away)) - 0.024)
     found = grasps(design)
