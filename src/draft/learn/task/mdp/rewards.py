@@ -25,6 +25,7 @@ from draft.learn.task.world.access import (
     command_of,
     ground_of,
     iteration,
+    of_angles,
     robot_of,
 )
 from draft.learn.task.world.task import Task
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
     from mjlab.sensor import ContactSensor
 
+# Terms of feet that are lifted and set down, which a robot on driven wheels has not: its wheels stay
+# on the ground, where `clearance` would punish the speed of their centres.
+OF_STEPS = ("air_time", "clearance")
 ENOUGH = 0.8  # Share of the command at which the reward of progress is largest.
 F = TypeVar("F", bound=Callable[..., torch.Tensor])
 
@@ -276,5 +280,6 @@ def reward_cfgs(task: Task) -> dict[str, RewardTermCfg]:
     terms = {name: term.cfg(config.rewards) for name, term in REWARDS.items()}
     if not config.rewards.power_weight:
         del terms["power"]  # It is no published term.
+    terms["joint_limits"].params = {**of_angles(task.members[0])}
     terms["action_rate"].params = {"ramp": 0, "steps": config.learning.steps}
     return terms
