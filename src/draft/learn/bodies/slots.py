@@ -192,7 +192,8 @@ class _Pose:
         member = self.member
         if member.rolls:
             wheel = member.joints[member.rolls.index(True)]
-            cause = f"{wheel} of {member.name} drives a wheel by its speed, and a policy of all legs gives angles"
+            cause = f"{wheel} of {member.name} drives a wheel by its speed"
+            cause += ", and the policy of all legs gives angles"
             raise DraftError(cause, _ALONE)
         joints, legs = [-1] * len(member.joints), [0] * len(member.feet)
         for left in (True, False):

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
     from mjlab.sensor import ContactSensor
 
-# Terms of feet that are lifted and set down, which a robot on driven wheels has not: its wheels stay
-# on the ground, where `clearance` would punish the speed of their centres.
+# Terms of feet that are lifted and set down. Wheels stay on the ground: without slip the point that
+# touches it is at rest, and `clearance` would punish the speed of their centres.
 OF_STEPS = ("air_time", "clearance")
 ENOUGH = 0.8  # Share of the command at which the reward of progress is largest.
 F = TypeVar("F", bound=Callable[..., torch.Tensor])
