@@ -46,7 +46,7 @@ class DelayedTargets(JointPositionAction):
         super().__init__(cfg, env)
         robot = robot_of(env)
         if len(robot.wheels):
-            units = torch.full_like(robot.no_load_speed, cfg.scale)
+            units = self._scale * torch.ones_like(robot.no_load_speed)
             units[:, robot.wheels] = cfg.wheel_scale * robot.no_load_speed[:, robot.wheels]
             self._scale = units
         self._delay = self._drawn()

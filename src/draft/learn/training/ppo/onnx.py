@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import onnx
+import torch
 from mjlab.envs import ManagerBasedRlEnv
 from mjlab.envs.mdp.actions import JointPositionAction
 from mjlab.rl.exporter_utils import attach_metadata_to_onnx, get_base_metadata
@@ -123,9 +124,10 @@ def _gains(env: ManagerBasedRlEnv) -> tuple[list[float], list[float]]:
 
 def _scales(action: JointPositionAction) -> list[float]:
     """Angle [rad], or speed of a wheel [rad/s], per unit of action, of each joint."""
-    if isinstance(action.scale, float):
-        return [action.scale] * action.action_dim
-    return action.scale[0].tolist()
+    scale = action.scale
+    if isinstance(scale, torch.Tensor):  # With wheels it is of each joint in each world.
+        return scale[0].tolist()
+    return [scale] * action.action_dim
 
 
 def _dims(env: ManagerBasedRlEnv) -> list[int]:

@@ -83,7 +83,8 @@ def load_exported(
     """
     mean, divisor, layers = policy.network.layers()
     order, sign = _inputs(policy, of_joints)
-    joints, turned = np.array(of_joints.inverse.joints), np.float32(of_joints.inverse.sign)
+    inverse = of_joints.inverse
+    joints, turned = np.array(inverse.joints), np.array(inverse.sign, np.float32)
     first, bias = layers[0]
     layers[0] = first[:, order] * sign, bias
     last, offset = layers[-1]
