@@ -24,7 +24,7 @@ BUDGET = {
     "fitting": 3_890,
     "imports": 6_410,
     "laws": 2_040,
-    "learn": 19_970,
+    "learn": 20_130,
     "metrics": 3_020,
     "model": 4_010,
     "reporting": 1_820,
