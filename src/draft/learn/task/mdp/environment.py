@@ -100,8 +100,7 @@ def environment(
     _add_terms(cfg, config)
     STAGES[task.stage].apply(cfg, task)
     if first.rolls:
-        for name in OF_STEPS:
-            del cfg.rewards[name]
+        cfg.rewards = {name: term for name, term in cfg.rewards.items() if name not in OF_STEPS}
     length = cfg.terminations["time_out"].params["length"]
     cfg.episode_length_s = max(length.at(m.scale) for m in task.members)
     if play:
