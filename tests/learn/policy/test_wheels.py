@@ -108,7 +108,7 @@ def test_plain_mujoco_rolls_it_as_the_training_does(player: Player, policy: Poli
     controller = Controller(policy, model)
     player.env.reset()
     random, env = np.random.default_rng(3), player.env.unwrapped
-    offsets = random.uniform(-0.2, 0.2, 16) * 1.0
+    offsets = random.uniform(-0.2, 0.2, 16)
     offsets[WHEELS] = random.uniform(-20.0, 20.0, 4)  # Wheels at any angle.
     place(
         env,
@@ -131,7 +131,7 @@ def test_plain_mujoco_rolls_it_as_the_training_does(player: Player, policy: Poli
             player.env.step(player.policy(seen))
             for _ in range(4):
                 controller.step(data, COMMAND)
-            # Both go on from one state: only the step is compared, not how fast they part.
+            # Neither is set to the other's state in between.
             np.testing.assert_allclose(data.qpos[:7], state.qpos[0, :7].numpy(), atol=1e-3)
             np.testing.assert_allclose(data.qpos[7:], state.qpos[0, 7:].numpy(), atol=1e-2)
 
