@@ -151,6 +151,28 @@ def test_many_quadrupeds_are_those_that_are_read_alone() -> None:
         assert_alike(yaml.safe_load(text), yaml.safe_load(design_text(design[row])))
 
 
+def test_many_robots_on_wheels_are_those_that_are_read_alone() -> None:
+    rng = np.random.default_rng(0)
+    values = {
+        "wheel_radius": rng.uniform(0.08, 0.1, 20),
+        "shank_length": rng.uniform(0.2, 0.24, 20),
+    }
+    values["actuators.drive.no_load_speed"] = rng.uniform(30, 60, 20)
+    design = draft.load("wheeled").resolve(values)
+    rows = np.flatnonzero(np.broadcast_to(design.accepted, 20))[:4]
+    assert len(rows) == 4
+    with mock.patch.object(many, "_alone", wraps=many._alone) as alone:
+        found = legged_robots(design, rows)
+    assert alone.call_count == 1  # The others are read by arrays.
+    for row in rows:
+        robot = found[int(row)]
+        assert isinstance(robot, LeggedRobot)
+        expected = legged_robot(design[int(row)])
+        assert robot.rolls == (False, False, False, True) * 4
+        assert_alike(robot.as_dict(text=False), expected.as_dict(text=False))
+        assert robot.xml == expected.xml
+
+
 def assert_alike(one: Any, other: Any) -> None:
     """Plain data of the same form, with numbers that agree to rounding."""
     if isinstance(other, dict):

@@ -16,7 +16,13 @@ import pytest
 
 import draft
 from draft.errors import DraftError, RefusedError
-from draft.learn.bodies.legged import CLASSES, LeggedRobot, check_family, legged_robot
+from draft.learn.bodies.legged import (
+    CLASSES,
+    LeggedRobot,
+    check_family,
+    legged_robot,
+    lowest_point,
+)
 from tests.helpers import wheeled
 from tests.learn.small import member
 
@@ -246,11 +252,26 @@ def test_robots_that_cannot_be_trained_are_refused_with_the_cause(
     assert str(caught.value) == f"quadruped cannot be trained: {cause}\n  {ONLY}"
 
 
-def test_a_robot_on_driven_wheels_is_refused_as_its_actions_would_be_angles() -> None:
-    with pytest.raises(DraftError) as caught:
-        legged_robot(wheeled().resolve())
-    cause = "tester cannot be trained: its joint FL_roll drives a wheel by its speed"
-    assert caught.value.problems[0].cause == cause
+def test_a_robot_on_driven_wheels_is_trained_with_the_speeds_of_its_wheels() -> None:
+    found = legged_robot(wheeled().resolve())
+    wheels = [name for name, rolls in zip(found.joints, found.rolls, strict=True) if rolls]
+    assert wheels == ["FL_roll", "FR_roll", "RL_roll", "RR_roll"]
+    assert found.foot_radius == 0.09
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.2, -0.7, np.pi / 2])
+def test_a_wheel_with_a_tilted_axle_stands_on_its_rim(tilt: float) -> None:
+    quat = f"{np.cos(np.pi / 4 + tilt / 2)} {np.sin(np.pi / 4 + tilt / 2)} 0 0"
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><worldbody><body pos="0 0 1"><geom name="wheel" type="cylinder"
+        size="0.09 0.02" quat="{quat}"/></body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    angle = np.linspace(0, 2 * np.pi, 721)
+    rims = [(0.09 * np.cos(a), 0.09 * np.sin(a), side) for a in angle for side in (-0.02, 0.02)]
+    points = data.geom("wheel").xpos + np.array(rims) @ data.geom("wheel").xmat.reshape(3, 3).T
+    assert lowest_point(model, data, "wheel") == pytest.approx(points[:, 2].min(), abs=1e-6)
 
 
 def test_without_a_home_pose_legs_crouch_and_other_joints_stay_at_zero(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def place(
     robot.write_root_state_to_sim(torch.cat(pose, dim=1))
     home = robot.data.default_joint_pos.clone()
     angles = home if joints is None else rows(joints)
-    robot.write_joint_state_to_sim(angles, torch.zeros(worlds, 12) + speeds)
+    robot.write_joint_state_to_sim(angles, torch.zeros_like(home) + speeds)
     env.sim.forward()
     env.scene.update(dt=0.0)
 

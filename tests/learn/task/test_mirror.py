@@ -27,15 +27,15 @@ POLAR = (1.0, -1.0, 1.0)
 AXIAL = (-1.0, 1.0, -1.0)
 
 
-@pytest.fixture(scope="module")
-def cheetah() -> LeggedRobot:
-    return member()
+@pytest.fixture(scope="module", params=["cheetah", "wheeled"])
+def robot(request: pytest.FixtureRequest) -> LeggedRobot:
+    return member(request.param)
 
 
 @pytest.fixture(scope="module")
-def env(cheetah: LeggedRobot) -> Any:
+def env(robot: LeggedRobot) -> Any:
     """Two worlds without anything random after the reset; the second is to mirror the first."""
-    task = Task((cheetah,), ground="flat", see_design=True)
+    task = Task((robot,), ground="flat", see_design=robot.is_quadruped)
     made = ManagerBasedRlEnv(environment(task, 2, play=True), device="cpu")
     yield made
     made.close()
@@ -47,7 +47,8 @@ def start_mirrored(env: Any, member: LeggedRobot) -> None:
     torch.manual_seed(4)
     polar, axial = torch.tensor([[1.0] * 3, POLAR]), torch.tensor([[1.0] * 3, AXIAL])
     linear, angular = torch.randn(2, 3) * 0.4
-    joints, speeds = torch.tensor(member.home) + 0.1 * torch.randn(12), torch.randn(12)
+    count = len(member.joints)
+    joints, speeds = torch.tensor(member.home) + 0.1 * torch.randn(count), torch.randn(count)
     quat = quat_from_euler_xyz(*(torch.tensor([0.12, -0.09, 0.4]) * axial).unbind(1))
     place(
         env,
@@ -71,7 +72,7 @@ def other_side(values: torch.Tensor, member: LeggedRobot) -> torch.Tensor:
     for i, name in enumerate(member.joints):
         other = {"L": "R", "R": "L"}
         twin = member.joints.index("".join((name[0], other[name[1]], name[2:])))
-        found[twin] = -values[i] if name.endswith("roll") else values[i]
+        found[twin] = -values[i] if name.endswith("hip_roll") else values[i]
     return found
 
 
@@ -80,7 +81,7 @@ def walk_mirrored(env: Any, member: LeggedRobot, steps: int) -> dict[str, torch.
     start_mirrored(env, member)
     generator, seen = torch.Generator().manual_seed(2), {}
     for _ in range(steps):
-        action = torch.randn(12, generator=generator)
+        action = torch.randn(len(member.joints), generator=generator)
         seen = env.step(torch.stack((action, other_side(action, member))))[0]
     assert env.episode_length_buf.tolist() == [steps, steps]  # No fall has reset a world.
     return seen
@@ -94,22 +95,24 @@ def of_terms(env: Any, group: str, values: torch.Tensor) -> dict[str, torch.Tens
 
 
 def test_the_mirrored_robot_sees_the_mirror_image_of_what_the_robot_sees(
-    env: Any, cheetah: LeggedRobot
+    env: Any, robot: LeggedRobot
 ) -> None:
-    seen = walk_mirrored(env, cheetah, 12)
+    seen = walk_mirrored(env, robot, 12)
     for group, (one, other) in seen.items():
         expected = of_terms(env, group, mirror.flips(env)[group](one))
         for name, value in of_terms(env, group, other).items():
             torch.testing.assert_close(value, expected[name], atol=2e-3, rtol=2e-3, msg=name)
     # It touches the ground, and is not symmetric itself; flat ground looks alike from both sides.
     here, there = (of_terms(env, "critic", one) for one in seen["critic"])
-    assert 0 < here["foot_contact"].sum() < 4
-    for name in here.keys() - {"height_scan", "design"}:
+    wheels = bool(robot.rolls)  # All of them stay on the ground.
+    assert 0 < here["foot_contact"].sum() < 4 + wheels
+    same = {"foot_contact", "foot_air_time"} if wheels else set[str]()
+    for name in here.keys() - {"height_scan", "design"} - same:
         assert (here[name] - there[name]).abs().max() > 0.004, name
 
 
 def test_the_scan_of_mirrored_ground_is_mirrored(
-    env: Any, cheetah: LeggedRobot, monkeypatch: pytest.MonkeyPatch
+    env: Any, robot: LeggedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ground = env.scene[GROUND]
     place = (torch.arange(322) - 160.5) * 0.025
@@ -119,7 +122,7 @@ def test_the_scan_of_mirrored_ground_is_mirrored(
     rim = torch.tensor([161.0, 161.0])  # Cells from the edge to the middle, and one around all.
     monkeypatch.setattr(ground, "_shift", rim, raising=False)
     monkeypatch.setattr(ground, "_last", (2 * rim - 1).int(), raising=False)
-    start_mirrored(env, cheetah)
+    start_mirrored(env, robot)
     env.sim.forward()
     seen = env.observation_manager.compute(update_history=True)["critic"]
     here, there = (of_terms(env, "critic", one) for one in seen)
@@ -139,17 +142,17 @@ def test_an_image_of_an_image_is_what_it_was(env: Any) -> None:
 
 
 def test_what_has_no_known_image_is_refused(
-    env: Any, cheetah: LeggedRobot, monkeypatch: pytest.MonkeyPatch
+    env: Any, robot: LeggedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    manager, robot = env.observation_manager, env.scene["robot"].cfg
+    manager, cfg = env.observation_manager, env.scene["robot"].cfg
     terms, widths = manager.active_terms, manager.group_obs_term_dim
-    smell = ["smell" if name == "design" else name for name in terms["actor"]]
-    odd = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))
+    smell = ["smell" if name == "command" else name for name in terms["actor"]]
+    odd = replace(robot, name="odd", mirror_sign=tuple(-s for s in robot.mirror_sign))
     wide = [(6,), *widths["actor"][1:]]
     for words, patch in {
         r"(?s)observation 'smell' is not known.*learning\.mirror": (terms, "actor", smell),
         r"'base_lin_vel'.*shape \(6,\), not \(3,\)": (widths, "actor", wide),
-        "of odd mirror differently from those of quad": (vars(robot), "members", (cheetah, odd)),
+        "of odd mirror differently from those of ": (vars(cfg), "members", (robot, odd)),
     }.items():
         with monkeypatch.context() as patched:
             patched.setitem(*patch)

@@ -23,6 +23,7 @@ from draft.laws.actuators import laws
 from draft.laws.limits import copper_loss
 from draft.laws.torque_speed import stall_torque
 from draft.learn.bodies.topology import foot_of, mirrored_joints, mirrored_legs, topology, upper_of
+from draft.metrics.rolling import driven_wheels, rolling_speed
 from draft.metrics.speed import top_speed
 from draft.model import pose
 from draft.model.texts import Text, with_template
@@ -48,14 +49,14 @@ class LeggedRobot:
         joints: names of the joints.
         leg_joints: indices of the joints of each leg, from the trunk outwards.
         feet: names of the feet's sites.
-        foot_geoms: names of the feet's spheres or plates.
+        foot_geoms: names of the feet's spheres, plates or wheels.
         upper_legs: names of the geoms of each leg's thigh, between the knee and the joint above it.
         home: joint angles of the home pose [rad].
         ranges: joint ranges [rad].
         peak_torque: peak torque of each joint [N m].
         no_load_speed: no-load speed of each joint [rad/s].
         leg_length: thigh plus shank of the longest leg [m].
-        foot_radius: radius of the smallest foot, or half the width of a plate [m].
+        foot_radius: radius of the smallest foot or wheel, or half the width of a plate [m].
         height: trunk's origin above the ground in the home pose [m].
         top_speed: estimated top speed [m/s].
         mass: total mass [kg].
@@ -71,6 +72,8 @@ class LeggedRobot:
         electronics: stated power of computers, sensors and idle drives [W]; () if the design states
             none.
         block: half side and middle of a payload [m], which is not in the text; () without one.
+        rolls: for each joint, whether it drives a wheel: a policy sets its speed, and its angle
+            means nothing. Others are driven to an angle. () without driven wheels.
     """
 
     name: str
@@ -99,6 +102,7 @@ class LeggedRobot:
     rated_torque: tuple[float, ...] = ()
     motor_heat: tuple[float, ...] = ()
     block: tuple[float, ...] = ()
+    rolls: tuple[bool, ...] = ()
 
     @property
     def xml(self) -> str:
@@ -125,9 +129,15 @@ class LeggedRobot:
         return zip(self.peak_torque, self.no_load_speed, corner_speed, strict=True)
 
     @property
+    def turned(self) -> tuple[int, ...]:
+        """Indices of the joints that are driven to an angle: all but those of wheels."""
+        return tuple(j for j in range(len(self.joints)) if not (self.rolls and self.rolls[j]))
+
+    @property
     def is_quadruped(self) -> bool:
         """Whether it has four legs of three joints, as the robots of the published study."""
-        return len(self.joints) == 12 and [len(leg) for leg in self.leg_joints] == [3] * 4
+        legs = [len(leg) for leg in self.leg_joints]
+        return len(self.joints) == 12 and legs == [3] * 4 and not self.rolls
 
     @property
     def classes(self) -> tuple[str, ...]:
@@ -178,7 +188,7 @@ class LeggedRobot:
 
 # Defaults of the fields that were added later: older records lack them.
 _LATER: dict[str, Any] = dict.fromkeys(
-    ("corner_speed", "battery", "electronics", "rated_torque", "motor_heat", "block"), ()
+    ("corner_speed", "battery", "electronics", "rated_torque", "motor_heat", "block", "rolls"), ()
 )
 
 
@@ -221,7 +231,7 @@ def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
         leg_length=max(float(leg.length) for leg in legs(design)),
         foot_radius=min(radius_of_foot(model.mujoco, geom) for _, geom in sites),
         height=_height(model, home, [geom for _, geom in sites]),
-        top_speed=scalar(top_speed(design)),
+        top_speed=scalar(estimated_speed(design)),
         mass=scalar(design.mass),
         leg_mirror=sides,
         mirror=tuple(index[other[joint]] for joint in joints),
@@ -233,7 +243,20 @@ def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
             _of_actuators(design, "rated_torque"), _of_actuators(design, "peak_torque")
         ),
         motor_heat=_of_actuators(design, "copper_loss"),
+        rolls=driven_by_speed(design),
     )
+
+
+def driven_by_speed(design: Design) -> tuple[bool, ...]:
+    """Whether each joint drives a wheel; () if none does."""
+    rolls = tuple(joint.rolls for joint in design.joints.values())
+    return rolls if any(rolls) else ()
+
+
+def estimated_speed(design: Design) -> Value:
+    """Estimate of the top speed [m/s]: of rolling if all feet are driven wheels, else of legs."""
+    wheels = len(driven_wheels(design))
+    return rolling_speed(design) if wheels and wheels == len(design.feet) else top_speed(design)
 
 
 def corners(speeds: tuple[float, ...]) -> tuple[float, ...]:
@@ -274,7 +297,9 @@ def with_one_template(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]
 
 
 _SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # Of the crouch.
-_TOPOLOGY = ("trunk", "joints", "leg_joints", "feet", "foot_geoms", "upper_legs", "mirror")
+_TOPOLOGY = (
+    *("trunk", "joints", "rolls", "leg_joints", "feet", "foot_geoms", "upper_legs", "mirror"),
+)
 
 
 def by_topology(members: Sequence[LeggedRobot]) -> list[tuple[LeggedRobot, ...]]:
@@ -355,7 +380,7 @@ def _of_actuators(design: Design, number: str) -> tuple[float, ...]:
 
 
 def radius_of_foot(model: mujoco.MjModel, geom: str) -> float:
-    """Radius of a sphere, or half the width of a plate [m]."""
+    """Radius of a sphere or a wheel, or half the width of a plate [m]."""
     size = model.geom(geom).size
     return float(min(size[:2]) if model.geom(geom).type == mujoco.mjtGeom.mjGEOM_BOX else size[0])
 
@@ -368,11 +393,14 @@ def _shared_end(names: Sequence[str]) -> str:
 
 
 def lowest_point(model: mujoco.MjModel, data: mujoco.MjData, geom: str) -> float:
-    """Height of the lowest point of a sphere or a box [m]."""
+    """Height of the lowest point of a sphere, a box or a wheel [m]."""
     i = model.geom(geom).id
     height, size = float(data.geom_xpos[i][2]), model.geom_size[i]
+    up = np.abs(data.geom_xmat[i].reshape(3, 3)[2])
     if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_BOX:
-        return height - float(np.abs(data.geom_xmat[i].reshape(3, 3)[2]) @ size)
+        return height - float(up @ size)
+    if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return height - float(np.hypot(up[0], up[1]) * size[0] + up[2] * size[1])
     return height - float(size[0])
 
 

@@ -20,6 +20,7 @@ from draft.errors import DraftError
 from draft.learn.bodies.legged import (
     LeggedRobot,
     corners,
+    estimated_speed,
     known_ratings,
     legged_robot,
     lowest_point,
@@ -28,7 +29,6 @@ from draft.learn.bodies.legged import (
     stated_electronics,
 )
 from draft.learn.bodies.topology import APART, MIDDLE
-from draft.metrics.speed import top_speed
 from draft.model import pose
 from draft.model.batch import ModelBatch, build_batch, follows_mujoco
 from draft.model.mjcf import robot_texts
@@ -108,7 +108,7 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
         "leg_length": _column(design, maximum(*(leg.length for leg in legs(design))), rows),
         "foot_radius": _foot_radii(batch, first),
         "height": _heights(batch, first, home[rows]),
-        "top_speed": _column(design, top_speed(design), rows),
+        "top_speed": _column(design, estimated_speed(design), rows),
         "mass": _column(design, design.mass, rows),
     }
     same = {name: getattr(first, name) for name in LeggedRobot.__dataclass_fields__}

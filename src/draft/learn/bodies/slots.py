@@ -40,6 +40,7 @@ FEATURES = len(OF_JOINT) * SLOTS + len(OF_LEG) * len(LEGS) + len(OF_BODY)
 # Units of them, by `readable_slots`.
 _UNITS_OF_JOINT, _UNITS_OF_BODY = ("", "N m", "rad/s", "kg m2", "rad"), ("m", "kg", "m", "", "m")
 _UPRIGHT = 0.7  # Vertical part of an axis from which a joint turns the leg about the vertical.
+_ALONE = "train a policy for this robot alone: 'draft train'"
 _STRAIGHT = 0.02  # Angle of a knee below which a leg counts as straight [rad].
 # A joint of a left leg counts as positive about an axis with a positive part along this.
 _POSITIVE = np.array([1.0, 0.8, 0.5])
@@ -148,7 +149,7 @@ def slots_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> Slots:
         model: its model; None to compile it.
 
     Raises:
-        DraftError: a leg has more than three joints above its knee, or two below.
+        DraftError: a leg has more than three joints above its knee or two below, or a driven wheel.
     """
     return _Pose(member, model).slots()
 
@@ -189,6 +190,11 @@ class _Pose:
 
     def slots(self) -> Slots:
         member = self.member
+        if member.rolls:
+            wheel = member.joints[member.rolls.index(True)]
+            cause = f"{wheel} of {member.name} drives a wheel by its speed"
+            cause += ", and the policy of all legs gives angles"
+            raise DraftError(cause, _ALONE)
         joints, legs = [-1] * len(member.joints), [0] * len(member.feet)
         for left in (True, False):
             side = [leg for leg in range(len(legs)) if self.left[leg] == left]
@@ -336,4 +342,4 @@ def _too_many(member: LeggedRobot, joints: Sequence[int], side: str) -> DraftErr
     names = ", ".join(member.joints[joint] for joint in joints)
     most = 3 if side == "above" else 2
     cause = f"{member.name} has a leg with more than {most} joints {side} its knee: {names}"
-    return DraftError(cause, "train a policy for this robot alone: 'draft train'")
+    return DraftError(cause, _ALONE)

@@ -56,7 +56,7 @@ def topology(design: Design) -> tuple[str, list[Chain]]:
     """Name of a design, and its legs in the model's order.
 
     Raises:
-        DraftError: it has fewer than two legs, a joint without an actuator, or a driven wheel.
+        DraftError: it has fewer than two legs, or a joint without an actuator.
     """
     name = design.name if design.label == "default" else f"{design.name}:{design.label}"
     if not design.floating:
@@ -67,11 +67,6 @@ def topology(design: Design) -> tuple[str, list[Chain]]:
             raise _untrainable(name, f"its joint {joint} follows {one.follows.joint}")
         if one.actuator is None:
             raise _untrainable(name, f"its joint {joint} has no actuator")
-        if one.rolls:
-            cause = f"{name} cannot be trained: its joint {joint} drives a wheel by its speed"
-            raise DraftError(
-                cause, "a policy's actions are angles: name a robot that walks on feet"
-            )
     chains = [chain for leg in legs(design) for chain in _of_kind(design, leg)]
     if len(chains) < LEAST_LEGS:
         found = "one leg" if chains else "no legs"

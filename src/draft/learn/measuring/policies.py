@@ -221,13 +221,17 @@ def _with_drive(policy: Policy, name: str, drive: Drive) -> Source:
 
 def config_of(policy: Policy) -> Config:
     """Numbers of the task of an exported policy: those of recipe laptop, but for what it states."""
+    turned = ~policy.rolls
     own = {
         "physics.timestep": policy.timestep,
         "physics.decimation": float(round(policy.control_period / policy.timestep)),
-        "actuation.action_scale": float(np.median(policy.action_scale)),
-        "actuation.stiffness": float(np.median(policy.stiffness / policy.peak_torque)),
+        "actuation.action_scale": float(np.median(policy.action_scale[turned])),
+        "actuation.stiffness": float(np.median((policy.stiffness / policy.peak_torque)[turned])),
         "actuation.damping": float(np.median(policy.damping / policy.peak_torque)),
     }
+    if policy.rolls.any():
+        shares = (policy.action_scale / policy.no_load_speed)[policy.rolls]
+        own["actuation.wheel_scale"] = float(np.median(shares))
     usual = LAPTOP.config
     changed: dict[str, object] = {
         "episodes.contact_time": policy.contact_time,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from draft.errors import DraftError
+from draft.learn.policy.matching import ANGLES, OF_JOINTS
 from draft.learn.policy.policy import DESIGN, Policy
 from draft.learn.task.recipes import LAPTOP
 
@@ -140,7 +141,7 @@ class Controller:
             "base_lin_vel": linear,
             "base_ang_vel": angular,
             "projected_gravity": -turn[2],
-            "joint_pos": sign * (data.qpos[self._q] - self.policy.home),
+            ANGLES: (sign * (data.qpos[self._q] - self.policy.home))[~self.policy.rolls],
             "joint_vel": sign * data.qvel[self._v],
             "actions": self._action,
             "command": np.asarray(command, float),
@@ -178,9 +179,7 @@ _TERMS = frozenset(
         "base_lin_vel",
         "base_ang_vel",
         "projected_gravity",
-        "joint_pos",
-        "joint_vel",
-        "actions",
+        *OF_JOINTS,
         "command",
         "height_scan",
         DESIGN,

@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 _ALIKE = 0.8
 _STRAIGHT = 0.05  # Bend below which a knee bends neither way [rad].
 _SIDES = {1: "left", -1: "right"}
-# Terms of the observations with a number for each joint.
-OF_JOINTS = ("joint_pos", "joint_vel", "actions")
+# Terms of the observations with a number for each joint; that of the angles has none for wheels.
+ANGLES = "joint_pos"
+OF_JOINTS = (ANGLES, "joint_vel", "actions")
 Leg = tuple[int, int]  # Side, 1 for left and -1 for right, and place from the front.
 
 
@@ -43,14 +44,16 @@ class Structure:
         axes: axis of each joint in the trunk's frame, in the home pose.
         bends: for each joint, the angle of a knee in the home pose about its axis, from the
             straight leg [rad]; 0 for other joints.
+        rolls: for each joint, whether it drives a wheel by its speed; () without wheels.
     """
 
     places: tuple[tuple[int, ...], ...]
     axes: tuple[tuple[float, ...], ...]
     bends: tuple[float, ...]
+    rolls: tuple[bool, ...] = ()
 
     def texts(self) -> dict[str, Sequence[object]]:
-        """Entries of a policy's metadata; none where a joint is on no leg."""
+        """Entries of a policy's metadata but `rolls`; none where a joint is on no leg."""
         if not all(self.places):
             return {}
         return {
@@ -76,6 +79,7 @@ class Structure:
             tuple(tuple(map(int, place)) for place in places),
             tuple(tuple(map(float, axis)) for axis in axes),
             tuple(map(float, texts["joint_bends"].split(","))),
+            rolls_of_texts(texts),
         )
 
     def legs(self) -> dict[Leg, list[int]]:
@@ -104,6 +108,24 @@ class Match:
     def of_equals(joints: int) -> Match:
         """Return the match of a robot with itself."""
         return Match(tuple(range(joints)), (1.0,) * joints)
+
+    @property
+    def inverse(self) -> Match:
+        """Match of the policy's joints for those of the design."""
+        order = np.argsort(self.joints)
+        return Match(tuple(order.tolist()), tuple(np.array(self.sign)[order].tolist()))
+
+    def entries(self, term: str, rolls: Sequence[bool]) -> tuple[list[int], list[float]]:
+        """Entries of a term of the design's observation in the order of the policy, and signs.
+
+        Args:
+            term: one of `OF_JOINTS`.
+            rolls: for each joint of the design, whether it drives a wheel; () without wheels.
+        """
+        left_out = {j for j, one in enumerate(rolls) if one} if term == ANGLES else set()
+        at = {j: i for i, j in enumerate(sorted({*self.joints} - left_out))}
+        chosen = [(at[j], s) for j, s in zip(self.joints, self.sign, strict=True) if j in at]
+        return [i for i, _ in chosen], [sign for _, sign in chosen]
 
     @property
     def same(self) -> bool:
@@ -142,7 +164,19 @@ def structure_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> St
         points = np.array([*anchors[list(joints)], feet[leg]])
         knee, bend = knee_of(points, axes[list(joints)])
         bends[joints[knee]] = bend
-    return Structure(tuple(places), tuple(map(tuple, axes.tolist())), tuple(bends))
+    axes = tuple(map(tuple, axes.tolist()))
+    return Structure(tuple(places), axes, tuple(bends), member.rolls)
+
+
+def rolls_of_texts(texts: Mapping[str, str]) -> tuple[bool, ...]:
+    """Mask of the joints that drive wheels, of a policy's metadata; () if it has none.
+
+    Raises:
+        ValueError: entries are no numbers.
+    """
+    if "joint_rolls" not in texts:
+        return ()
+    return tuple(bool(int(x)) for x in texts["joint_rolls"].split(","))
 
 
 def match_of(policy: Policy, member: LeggedRobot) -> Match | str:
@@ -202,6 +236,8 @@ def match(
         joint: legs[leg][i] for leg, ones in theirs.legs().items() for i, joint in enumerate(ones)
     }
     order = [at[joint] for joint in range(len(names))]
+    if reason := _other_wheels(theirs, own, order, names):
+        return reason
     cosines = (np.array(theirs.axes) * np.array(own.axes)[order]).sum(axis=1)
     sign = np.where(cosines < 0, -1.0, 1.0)
     crossed = [names[order[i]] for i in np.flatnonzero(np.abs(cosines) < _ALIKE)]
@@ -234,6 +270,19 @@ def _other_legs(theirs: Structure, own: Structure, names: Sequence[str]) -> str:
     others = [name for name, place in zip(names, own.places, strict=True) if not place]
     if others:
         return f"the robot has {_listed(others)} besides its legs, which the policy does not drive"
+    return ""
+
+
+def _other_wheels(
+    theirs: Structure, own: Structure, order: Sequence[int], names: Sequence[str]
+) -> str:
+    """Which joint is driven to an angle by one and to a speed by the other; "" if none is."""
+    for joint, at in enumerate(order):
+        known, found = (any(one.rolls) and one.rolls[j] for one, j in ((theirs, joint), (own, at)))
+        if known != found:
+            said = "a speed", "an angle"
+            given, needed = said if known else said[::-1]
+            return f"the policy gives {names[at]} {given}, and the robot drives it to {needed}"
     return ""
 
 

@@ -106,6 +106,8 @@ def of_policy(policy: Policy, member: LeggedRobot, commands: Sequence[float]) ->
     }
     if policy.structure is not None:
         metadata |= policy.structure.texts()
+    if policy.rolls.any():
+        metadata["joint_rolls"] = policy.rolls.astype(int)
     return chain(*policy.network.layers(), {key: text(value) for key, value in metadata.items()})
 
 

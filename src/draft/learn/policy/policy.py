@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from draft.errors import DraftError, suggest
-from draft.learn.policy.matching import Structure
+from draft.learn.policy.matching import Structure, rolls_of_texts
 from draft.learn.policy.onnx_file import Network, read
 from draft.learn.task.constants import CONTACT_TIME
 from draft.learn.task.scan import scan_points
@@ -46,9 +46,12 @@ class Policy:
         structure: their places and axes in training; None for a file that does not state them.
         sign: for each joint, -1 if it turns the other way than in training, so that its angle,
             speed and action change signs, shape (joints,).
+        rolls: for each joint, whether it drives a wheel: its target is a speed, not an angle,
+            shape (joints,).
         home: joint angles to which actions are added [rad], shape (joints,).
-        action_scale: joint offset per unit of action [rad], shape (joints,).
-        stiffness: gain kp [N m/rad], shape (joints,).
+        action_scale: joint offset [rad], or speed of a wheel [rad/s], per unit of action, shape
+            (joints,).
+        stiffness: gain kp [N m/rad], 0 for wheels, shape (joints,).
         damping: gain kd [N m s/rad], shape (joints,).
         peak_torque: peak torque [N m], shape (joints,).
         stall_torque: torque at standstill without the current limit [N m], shape (joints,).
@@ -81,6 +84,7 @@ class Policy:
     joints: tuple[str, ...]
     structure: Structure | None
     sign: Array
+    rolls: NDArray[np.bool_]
     home: Array
     action_scale: Array
     stiffness: Array
@@ -112,7 +116,8 @@ class Policy:
             observations: shape (..., n), with n the sum of the lengths in `terms`.
 
         Returns:
-            Actions, shape (..., joints): offsets from `home` in units of `action_scale`.
+            Actions, shape (..., joints): offsets from `home`, or speeds of wheels, in units of
+            `action_scale`.
 
         Raises:
             DraftError: the observations have another length.
@@ -128,14 +133,17 @@ class Policy:
     def torque(self, action: ArrayLike, angle: ArrayLike, speed: ArrayLike) -> Array:
         """Joint torques of the PD law, limited by the torque-speed line of a DC motor [N m].
 
+        That of a wheel is proportional to the difference of its speed and its target.
+
         Args:
             action: action of the policy, shape (..., joints).
             angle: joint angles [rad], shape (..., joints).
             speed: joint velocities [rad/s], shape (..., joints).
         """
         action, angle, speed = (np.asarray(one, float) for one in (action, angle, speed))
-        target = self.home + self.sign * self.action_scale * action
-        wanted = self.stiffness * (target - angle) - self.damping * speed
+        offset = self.sign * self.action_scale * action
+        speeds = np.where(self.rolls, offset, 0.0)  # Wheels have no stiffness.
+        wanted = self.stiffness * (self.home + offset - angle) + self.damping * (speeds - speed)
         return np.clip(wanted, *self.torque_bounds(speed))
 
     def torque_bounds(self, speed: ArrayLike) -> tuple[Array, Array]:
@@ -255,6 +263,7 @@ def _policy(file: Path, network: Network) -> Policy:
         joints=joints,
         structure=Structure.of_texts(texts),
         sign=np.ones(len(joints)),
+        rolls=np.array(rolls_of_texts(texts) or (False,) * len(joints)),
         home=numbers("default_joint_pos"),
         action_scale=numbers("action_scale"),
         stiffness=numbers("joint_stiffness"),

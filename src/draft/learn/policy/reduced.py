@@ -158,6 +158,7 @@ class LegsPolicy:
             joints=member.joints,
             structure=structure_of(member, model),
             sign=np.ones(count),
+            rolls=np.zeros(count, bool),
             home=np.array(member.home),
             action_scale=np.full(count, float(texts["action_scale"])),
             stiffness=float(texts["stiffness"]) * peak,

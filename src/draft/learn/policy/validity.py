@@ -280,10 +280,12 @@ def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
 def _adapted(policy: Policy, member: LeggedRobot, own: ArrayLike, match: Match) -> Policy:
     """Policy with the joints, home pose, motors and gains of a design, and the features of it.
 
-    Training gives servos a stiffness and a damping per peak torque, so both scale with it.
+    Training gives servos a stiffness and a damping per peak torque, so both scale with it; targets
+    of wheels scale with their no-load speed.
     """
-    peak = match.taken(member.peak_torque)
+    peak, fastest = match.taken(member.peak_torque), match.taken(member.no_load_speed)
     stronger = peak / policy.peak_torque
+    faster = np.where(policy.rolls, fastest / policy.no_load_speed, 1.0)
     return replace(
         policy,
         joints=tuple(member.joints[j] for j in match.joints),
@@ -291,7 +293,8 @@ def _adapted(policy: Policy, member: LeggedRobot, own: ArrayLike, match: Match) 
         home=match.taken(member.home),
         peak_torque=peak,
         stall_torque=match.taken(member.stall_torque),
-        no_load_speed=match.taken(member.no_load_speed),
+        no_load_speed=fastest,
+        action_scale=policy.action_scale * faster,
         stiffness=policy.stiffness * stronger,
         damping=policy.damping * stronger,
         features=np.clip(own, *policy.known) if len(policy.features) else policy.features,

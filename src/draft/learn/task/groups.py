@@ -47,12 +47,22 @@ class Physics:
 
 @dataclass(frozen=True)
 class Actuation:
-    """PD control to a joint target within the linear torque-speed line, at every physics step."""
+    """PD control to a joint target within the linear torque-speed line, at every physics step.
+
+    Driven wheels are controlled to a speed, with the damping alone.
+    """
 
     stiffness: float = paper(STIFFNESS, "1/rad", "kp per peak torque")
     damping: float = paper(DAMPING, "s/rad", "kd per peak torque")
     action_scale: float = choice(
         0.175, "rad", "joint offset per unit of action", CODE, within=POSITIVE
+    )
+    wheel_scale: float = choice(
+        0.1,
+        "1",
+        "speed of a driven wheel per unit of action, per no-load speed",
+        DRAFT,
+        within=POSITIVE,
     )
     soft_limits: float = choice(
         0.9, "1", "central share of a range without penalty", CODE, within=SHARE

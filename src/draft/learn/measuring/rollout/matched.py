@@ -48,8 +48,9 @@ def matched(
             for name in OF_JOINTS:
                 start, end = spans.get(name, (0, 0))
                 if end > start:
-                    index[row, start:end] = start + np.array(one.joints)
-                    sign[row, start:end] = one.sign
+                    entries, signs = one.entries(name, robot.cfg.members[0].rolls)
+                    index[row, start:end] = start + np.array(entries)
+                    sign[row, start:end] = signs
         order, signs = (np.array([getattr(m, x) for m in matches]) for x in ("joints", "sign"))
         taken, flipped = _of_worlds(robot.member, index, sign)
         joints, turned = _of_worlds(robot.member, order, signs)

@@ -1,4 +1,4 @@
-"""Joint targets that arrive late."""
+"""Joint targets that arrive late, and those of driven wheels, which are speeds."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import torch
 from mjlab.envs import ManagerBasedRlEnv
 from mjlab.envs.mdp.actions import JointPositionAction, JointPositionActionCfg
+
+from draft.learn.task.world.access import robot_of
 
 _ROUNDED = 1e-9  # A delay of k physics steps is exactly k of them [s].
 
@@ -17,9 +19,11 @@ class DelayedTargetsCfg(JointPositionActionCfg):
 
     Attributes:
         delay: least and greatest delay [s], at most a control period.
+        wheel_scale: speed of a driven wheel per unit of action, per no-load speed.
     """
 
     delay: tuple[float, float]
+    wheel_scale: float
 
     def build(self, env: ManagerBasedRlEnv) -> DelayedTargets:
         """Build the term."""
@@ -31,7 +35,8 @@ class DelayedTargets(JointPositionAction):
     """Joint targets that arrive later than they are sent, by a delay of each world.
 
     A world draws its delay when it is reset, and holds the target before until it has passed. The
-    first target after a reset is preceded by the home pose.
+    first target after a reset is preceded by the home pose. Targets are angles, and speeds of
+    driven wheels [rad/s].
     """
 
     # mjlab declares the base class of all its configurations.
@@ -39,6 +44,11 @@ class DelayedTargets(JointPositionAction):
 
     def __init__(self, cfg: DelayedTargetsCfg, env: ManagerBasedRlEnv) -> None:
         super().__init__(cfg, env)
+        robot = robot_of(env)
+        if len(robot.wheels):
+            units = self._scale * torch.ones_like(robot.no_load_speed)
+            units[:, robot.wheels] = cfg.wheel_scale * robot.no_load_speed[:, robot.wheels]
+            self._scale = units
         self._delay = self._drawn()
         self._before = self._offset + torch.zeros_like(self._raw_actions)
         self._since = 0.0
@@ -54,7 +64,11 @@ class DelayedTargets(JointPositionAction):
         new = self._processed_actions
         late = (self._since < self._delay - _ROUNDED)[:, None]
         self._processed_actions = torch.where(late, self._before, new)
-        super().apply_actions()
+        super().apply_actions()  # Of wheels without effect: they have no stiffness.
+        wheels = robot_of(self._env).wheels
+        if len(wheels):
+            speeds = self._processed_actions[:, wheels]
+            self._entity.set_joint_velocity_target(speeds, joint_ids=wheels)
         self._processed_actions = new
         self._since += self._env.physics_dt
 

@@ -20,6 +20,7 @@ from mjlab.tasks.velocity import mdp as velocity_mdp
 from mjlab.terrains import TerrainEntityCfg
 from mjlab.viewer import ViewerConfig
 
+from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
 from draft.learn.task.mdp import terminations
@@ -27,7 +28,7 @@ from draft.learn.task.mdp.actions import DelayedTargetsCfg
 from draft.learn.task.mdp.commands import command_cfg
 from draft.learn.task.mdp.events import event_cfgs
 from draft.learn.task.mdp.observations import observation_cfgs
-from draft.learn.task.mdp.rewards import reward_cfgs
+from draft.learn.task.mdp.rewards import OF_STEPS, reward_cfgs
 from draft.learn.task.stages import STAGES
 from draft.learn.task.terms import TERMS, arguments, guarded
 from draft.learn.task.world.access import COMMAND, FEET, GROUND, THIGHS
@@ -71,7 +72,7 @@ def environment(
             extent=2.0,
         ),
         observations=observation_cfgs(task, play),
-        actions={"joint_pos": _targets(config)},
+        actions={"joint_pos": _targets(config, first)},
         commands={COMMAND: command_cfg(task)},
         events=event_cfgs(task),
         rewards=reward_cfgs(task),
@@ -98,6 +99,8 @@ def environment(
     )
     _add_terms(cfg, config)
     STAGES[task.stage].apply(cfg, task)
+    if first.rolls:
+        cfg.rewards = {name: term for name, term in cfg.rewards.items() if name not in OF_STEPS}
     length = cfg.terminations["time_out"].params["length"]
     cfg.episode_length_s = max(length.at(m.scale) for m in task.members)
     if play:
@@ -107,7 +110,7 @@ def environment(
     return cfg
 
 
-def _targets(config: Config) -> JointPositionActionCfg:
+def _targets(config: Config, first: LeggedRobot) -> JointPositionActionCfg:
     """Configuration of the action: targets of all joints."""
     targets = {
         "entity_name": "robot",
@@ -116,8 +119,9 @@ def _targets(config: Config) -> JointPositionActionCfg:
         "use_default_offset": True,
     }
     delay = config.episodes.delay
-    if any(delay):
-        return DelayedTargetsCfg(**targets, delay=delay)
+    if any(delay) or first.rolls:
+        share = config.actuation.wheel_scale
+        return DelayedTargetsCfg(**targets, delay=delay, wheel_scale=share)
     return JointPositionActionCfg(**targets)
 
 

@@ -11,7 +11,7 @@ from mjlab.managers.observation_manager import ObservationGroupCfg, ObservationT
 from mjlab.tasks.velocity import mdp as velocity_mdp
 from mjlab.utils.noise import UniformNoiseCfg
 
-from draft.learn.task.world.access import COMMAND, FEET, ground_of, robot_of
+from draft.learn.task.world.access import COMMAND, FEET, ground_of, of_angles, robot_of
 from draft.learn.task.world.task import Task
 
 if TYPE_CHECKING:
@@ -75,6 +75,7 @@ def observation_cfgs(task: Task, play: bool) -> dict[str, ObservationGroupCfg]:
         "joint_pos": ObservationTermCfg(
             # A biased encoder moves the target of the PD law only, as in the paper.
             func=envs_mdp.joint_pos_rel,
+            params=of_angles(task.members[0]),
             noise=_noise(numbers.joint_position_noise),
         ),
         "joint_vel": ObservationTermCfg(func=joint_velocity, params=velocity),

@@ -25,6 +25,7 @@ from draft.learn.task.world.access import (
     command_of,
     ground_of,
     iteration,
+    of_angles,
     robot_of,
 )
 from draft.learn.task.world.task import Task
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
     from mjlab.sensor import ContactSensor
 
+# Terms of feet that are lifted and set down, which a robot on driven wheels does without.
+OF_STEPS = ("air_time", "clearance")
 ENOUGH = 0.8  # Share of the command at which the reward of progress is largest.
 F = TypeVar("F", bound=Callable[..., torch.Tensor])
 
@@ -126,7 +129,7 @@ def upright(env: ManagerBasedRlEnv, sigma: Scaled) -> torch.Tensor:
 def air_time(env: ManagerBasedRlEnv, most: Scaled, gate: Scaled) -> torch.Tensor:
     """Number of feet in the air for less than `most` [s], per four feet.
 
-    It is zero for commands below `gate`.
+    It is zero for commands below `gate`. Robots on driven wheels, which roll, do without it.
     """
     robot = robot_of(env)
     sensor: ContactSensor = env.scene[FEET]
@@ -153,7 +156,9 @@ def height(env: ManagerBasedRlEnv, target: Scaled, sigma: Scaled) -> torch.Tenso
 def clearance(env: ManagerBasedRlEnv, target: Scaled, factor: Scaled, gate: Scaled) -> torch.Tensor:
     """Sum over feet of |height - target| x horizontal speed, per four feet.
 
-    It is zero for commands below `gate`.
+    It is zero for commands below `gate`. The speed is that of a foot's centre: of a wheel that
+    rolls without slip it is the robot's, though the point that touches the ground is at rest.
+    Robots on driven wheels therefore do without it.
     """
     robot = robot_of(env)
     sensor = ground_of(env)
@@ -276,5 +281,6 @@ def reward_cfgs(task: Task) -> dict[str, RewardTermCfg]:
     terms = {name: term.cfg(config.rewards) for name, term in REWARDS.items()}
     if not config.rewards.power_weight:
         del terms["power"]  # It is no published term.
+    terms["joint_limits"].params = {**of_angles(task.members[0])}
     terms["action_rate"].params = {"ramp": 0, "steps": config.learning.steps}
     return terms

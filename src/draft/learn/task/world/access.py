@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mjlab.managers.scene_entity_config import SceneEntityCfg
+
 if TYPE_CHECKING:
     import torch
     from mjlab.envs import ManagerBasedRlEnv
 
+    from draft.learn.bodies.legged import LeggedRobot
     from draft.learn.task.world.ground import HeightMap
     from draft.learn.task.world.robot import Robot
 
@@ -31,6 +34,18 @@ def command_of(env: ManagerBasedRlEnv) -> torch.Tensor:
     if value is None:
         raise KeyError(COMMAND)
     return value
+
+
+def of_angles(first: LeggedRobot) -> dict[str, SceneEntityCfg]:
+    """Parameters of a term of mjlab's that reads angles of joints: all but those of wheels.
+
+    Args:
+        first: a robot of the topology.
+    """
+    if not first.rolls:
+        return {}
+    names = tuple(first.joints[joint] for joint in first.turned)
+    return {"asset_cfg": SceneEntityCfg("robot", joint_names=names)}
 
 
 def iteration(env: ManagerBasedRlEnv, steps: int) -> int:

@@ -82,12 +82,14 @@ def _parts(env: ManagerBasedRlEnv) -> dict[str, Piece]:
     member = robot.cfg.members[0]
     polar, axial = list(enumerate(_POLAR)), list(enumerate(_AXIAL))
     joints = list(zip(member.mirror, member.mirror_sign, strict=True))
+    at = {joint: i for i, joint in enumerate(member.turned)}
+    turned = [(at[other], sign) for j, (other, sign) in enumerate(joints) if j in at]
     feet = [(other, 1.0) for other in member.leg_mirror]
     return {
         "base_lin_vel": polar,
         "base_ang_vel": axial,
         "projected_gravity": polar,
-        "joint_pos": joints,
+        "joint_pos": turned,
         "joint_vel": joints,
         "actions": joints,
         "command": list(enumerate(_COMMAND)),

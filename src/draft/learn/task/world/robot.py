@@ -70,6 +70,7 @@ class Robot(Entity):
         weight: weight of the design, without what the task adds [N], shape (worlds,).
         design: features of the design, shape (worlds, features); see `draft.learn.bodies.features`.
         sign: sign of each joint in its slot, shape (worlds, joints); ones without slots.
+        wheels: indices of the joints that drive wheels, shape (wheels,).
     """
 
     cfg: RobotCfg
@@ -95,6 +96,7 @@ class Robot(Entity):
         for name, values in self._of_designs(members, device).items():
             setattr(self, name, values[self.member])
         self.redrawn = False
+        self.wheels = torch.as_tensor(np.flatnonzero(members[0].rolls), device=device)
         self._motors = torch.ones_like(self.peak_torque)
         self.foot_sites = self.find_sites(members[0].feet, preserve_order=True)[0]
         self._set_gains()
@@ -175,13 +177,15 @@ class Robot(Entity):
     def _set_gains(self) -> None:
         """Set gains and torque-speed lines of each world, in place: mjlab fuses these tensors."""
         stiffness, damping = self.cfg.actuation.stiffness, self.cfg.actuation.damping
+        turned = torch.ones_like(self.peak_torque)
+        turned[:, self.wheels] = 0.0
         for actuator in self.actuators:
             joints = actuator.target_ids
             factors = self._motors[:, joints]
             torque = factors * self.peak_torque[:, joints]
             stall = factors * self.stall_torque[:, joints]
             values = {
-                "stiffness": stiffness * torque,
+                "stiffness": stiffness * torque * turned[:, joints],
                 "damping": damping * torque,
                 "force_limit": torque,
                 "saturation_effort": stall,

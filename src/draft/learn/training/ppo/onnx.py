@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import onnx
+import torch
 from mjlab.envs import ManagerBasedRlEnv
 from mjlab.envs.mdp.actions import JointPositionAction
 from mjlab.rl.exporter_utils import attach_metadata_to_onnx, get_base_metadata
@@ -76,7 +77,7 @@ def metadata(player: Loaded, run: Run) -> dict[str, str]:
         "joint_no_load_speed": list(member.no_load_speed),
         "joint_range": [list(ends) for ends in member.ranges],
         "action_names": action.target_names,
-        "action_scale": [action.scale] * action.action_dim,
+        "action_scale": _scales(action),
         "action_std": action_std(player.runner.alg.get_policy()).tolist(),
         "control_rate": 1.0 / env.step_dt,
         "physics_timestep": env.physics_dt,
@@ -97,6 +98,8 @@ def metadata(player: Loaded, run: Run) -> dict[str, str]:
     }
     if member.corner_speed:
         values["joint_stall_torque"] = list(member.stall_torque)
+    if member.rolls:
+        values["joint_rolls"] = list(map(int, member.rolls))
     values |= structure_of(member).texts()
     if member.is_quadruped:
         bodies = np.array(family_features(plan.members))
@@ -117,6 +120,14 @@ def _gains(env: ManagerBasedRlEnv) -> tuple[list[float], list[float]]:
             for name, values in gains.items():
                 values[joint] = float(getattr(actuator, name)[0, column])
     return gains["stiffness"], gains["damping"]
+
+
+def _scales(action: JointPositionAction) -> list[float]:
+    """Angle [rad], or speed of a wheel [rad/s], per unit of action, of each joint."""
+    scale = action.scale
+    if isinstance(scale, torch.Tensor):  # With wheels it is of each joint in each world.
+        return scale[0].tolist()
+    return [scale] * action.action_dim
 
 
 def _dims(env: ManagerBasedRlEnv) -> list[int]:

@@ -83,7 +83,8 @@ def load_exported(
     """
     mean, divisor, layers = policy.network.layers()
     order, sign = _inputs(policy, of_joints)
-    joints, turned = _inverse(of_joints)
+    inverse = of_joints.inverse
+    joints, turned = np.array(inverse.joints), np.array(inverse.sign, np.float32)
     first, bias = layers[0]
     layers[0] = first[:, order] * sign, bias
     last, offset = layers[-1]
@@ -135,19 +136,13 @@ def _state(
     return state
 
 
-def _inverse(of_joints: Match) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """Joint of the policy for each joint of the robot, and its sign."""
-    joints = np.argsort(of_joints.joints)
-    return joints, np.array(of_joints.sign, np.float32)[joints]
-
-
 def _inputs(policy: Policy, of_joints: Match) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     """Input of the policy for each input of a robot with other joints, and its sign."""
     order, sign, start = np.arange(policy.network.size), np.ones(policy.network.size, np.float32), 0
-    joints, turned = _inverse(of_joints)
     for name, length in policy.terms:
         if name in OF_JOINTS:
-            order[start : start + length] = start + joints
+            entries, turned = of_joints.inverse.entries(name, policy.rolls.tolist())
+            order[start : start + length] = start + np.array(entries)
             sign[start : start + length] = turned
         start += length
     return order, sign
