@@ -125,7 +125,7 @@ def test_plain_mujoco_rolls_it_as_the_training_does(player: Player, policy: Poli
     data.qpos[:], data.qvel[:] = state.qpos[0].numpy(), state.qvel[0].numpy()
     with torch.inference_mode():
         for _ in range(10):
-            seen = env.observation_manager.compute(update_history=True)
+            seen: Any = env.observation_manager.compute(update_history=True)
             expected = seen["actor"][0].numpy()
             np.testing.assert_allclose(controller.observe(data, COMMAND), expected, atol=2e-3)
             player.env.step(player.policy(seen))
