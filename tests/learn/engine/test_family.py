@@ -344,6 +344,27 @@ def test_worlds_are_given_other_designs_while_a_simulation_runs(
         each.close()
 
 
+@pytest.mark.parametrize("delay", [(0.0, 0.0), (0.005, 0.015)], ids=["at once", "late"])
+def test_targets_are_about_the_home_pose_of_the_design_that_a_world_was_given(
+    members: tuple[LeggedRobot, ...], delay: tuple[float, float]
+) -> None:
+    pytest.importorskip("mjbatch")
+    config = CALM.with_values({"episodes.delay": delay})
+    made = make(
+        environment(Task(members[:2], config=config, ground="flat"), 4, False), "cpu", "native"
+    )
+    made.reset(seed=0)
+    straighter = replace(members[4], home=tuple(0.8 * angle for angle in members[4].home))
+    redraw(made, torch.tensor([3]), [straighter])
+    made.reset(env_ids=torch.tensor([3]))
+    targets: Any = made.action_manager.get_term("joint_pos")
+    targets.process_actions(torch.zeros(4, 12))
+    for world, member in ((0, members[0]), (1, members[1]), (3, straighter)):
+        found = targets._processed_actions[world]
+        assert found.numpy() == pytest.approx(member.home, abs=1e-6)
+    made.close()
+
+
 def test_designs_that_do_not_fit_a_running_simulation_are_refused(
     env: Any, alone: list[Any], members: tuple[LeggedRobot, ...]
 ) -> None:

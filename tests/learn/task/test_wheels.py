@@ -202,7 +202,7 @@ def test_robots_on_feet_observe_and_act_as_before(flat: Any) -> None:
         layout = dict(zip(manager.active_terms[group], sizes, strict=True))
         assert list(layout.items()) == [*LAYOUT.items(), ("height_scan", 187), *more.items()]
     action = flat.action_manager.get_term("joint_pos")
-    assert (type(action).__name__, action.scale) == ("JointPositionAction", 0.175)
+    assert (type(action).__name__, action.scale) == ("Targets", 0.175)
     robot = flat.scene["robot"]
     for actuator in robot.actuators:
         gains = actuator.stiffness / robot.peak_torque[:, actuator.target_ids]

@@ -1,4 +1,4 @@
-"""Joint targets that arrive late, and those of driven wheels, which are speeds."""
+"""Joint targets about the home pose: at once or late, and those of driven wheels: speeds."""
 
 from __future__ import annotations
 
@@ -30,8 +30,26 @@ class DelayedTargetsCfg(JointPositionActionCfg):
         return DelayedTargets(self, env)
 
 
+@dataclass(kw_only=True)
+class TargetsCfg(JointPositionActionCfg):
+    """Configuration of joint targets about the home pose of each world's design."""
+
+    def build(self, env: ManagerBasedRlEnv) -> Targets:
+        """Build the term."""
+        return Targets(self, env)
+
+
+class Targets(JointPositionAction):
+    """Joint targets about the home pose of each world's design [rad]."""
+
+    def rescale(self) -> None:
+        """Take the numbers of the designs that worlds were given."""
+        home = self._entity.data.default_joint_pos[:, self._target_ids]
+        torch.as_tensor(self._offset).copy_(home)
+
+
 # Attributes of terms are part of saved states (see `snapshot`).
-class DelayedTargets(JointPositionAction):
+class DelayedTargets(Targets):
     """Joint targets that arrive later than they are sent, by a delay of each world.
 
     A world draws its delay when it is reset, and holds the target before until it has passed. The
@@ -46,12 +64,19 @@ class DelayedTargets(JointPositionAction):
         super().__init__(cfg, env)
         robot = robot_of(env)
         if len(robot.wheels):
-            units = self._scale * torch.ones_like(robot.no_load_speed)
-            units[:, robot.wheels] = cfg.wheel_scale * robot.no_load_speed[:, robot.wheels]
-            self._scale = units
+            self._scale = self._scale * torch.ones_like(robot.no_load_speed)
+            self.rescale()
         self._delay = self._drawn()
         self._before = self._offset + torch.zeros_like(self._raw_actions)
         self._since = 0.0
+
+    def rescale(self) -> None:
+        """Take the numbers of the designs that worlds were given."""
+        super().rescale()
+        robot = robot_of(self._env)
+        if len(robot.wheels):
+            speeds = self.cfg.wheel_scale * robot.no_load_speed[:, robot.wheels]
+            torch.as_tensor(self._scale)[:, robot.wheels] = speeds
 
     def process_actions(self, actions: torch.Tensor) -> None:
         """Take new targets; those of the step before hold until the delay has passed."""

@@ -24,7 +24,7 @@ from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
 from draft.learn.task.mdp import terminations
-from draft.learn.task.mdp.actions import DelayedTargetsCfg
+from draft.learn.task.mdp.actions import DelayedTargetsCfg, TargetsCfg
 from draft.learn.task.mdp.commands import command_cfg
 from draft.learn.task.mdp.events import event_cfgs
 from draft.learn.task.mdp.observations import observation_cfgs
@@ -122,7 +122,7 @@ def _targets(config: Config, first: LeggedRobot) -> JointPositionActionCfg:
     if any(delay) or first.rolls:
         share = config.actuation.wheel_scale
         return DelayedTargetsCfg(**targets, delay=delay, wheel_scale=share)
-    return JointPositionActionCfg(**targets)
+    return TargetsCfg(**targets)
 
 
 def _terrain(task: Task) -> TerrainEntityCfg:

@@ -95,10 +95,13 @@ def redraw(env: ManagerBasedRlEnv, worlds: torch.Tensor, members: Sequence[Legge
 
 
 def _terms(env: ManagerBasedRlEnv) -> list[Any]:
-    """Commands and events that may hold numbers of the designs."""
-    commands = env.command_manager
+    """Commands, actions and events that may hold numbers of the designs."""
     events = env.event_manager
-    held: list[Any] = [commands.get_term(name) for name in commands.active_terms]
+    held: list[Any] = [
+        manager.get_term(name)
+        for manager in (env.command_manager, env.action_manager)
+        for name in manager.active_terms
+    ]
     for names in events.active_terms.values():
         held += [events.get_term_cfg(name).func for name in names]
     return held
