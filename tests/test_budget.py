@@ -24,7 +24,7 @@ BUDGET = {
     "fitting": 3_890,
     "imports": 6_560,
     "laws": 2_070,
-    "learn": 20_140,
+    "learn": 20_160,
     "metrics": 3_200,
     "model": 4_090,
     "reporting": 1_820,

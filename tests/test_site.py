@@ -43,7 +43,7 @@ NEEDS = {
     "howto/quadruped": ("explore",),
     "howto/ros": (),
     "howto/train": (),
-    "howto/wheeled": (),
+    "howto/wheeled": ("explore",),
     "howto/walk": ("report",),
 }
 # Packages that a page says how to install.

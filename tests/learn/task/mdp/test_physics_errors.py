@@ -61,7 +61,7 @@ def send(env: Any, value: float) -> list[torch.Tensor]:
 def test_without_errors_there_are_no_terms_for_them(flat: Any) -> None:
     names = [name for names in flat.event_manager.active_terms.values() for name in names]
     assert not {"contact_time", "motor_errors"} & set(names)
-    assert type(flat.action_manager.get_term("joint_pos")).__name__ == "JointPositionAction"
+    assert type(flat.action_manager.get_term("joint_pos")).__name__ == "Targets"
 
 
 def test_the_feet_of_a_world_share_one_contact_time(env: Any, robot: Any) -> None:
