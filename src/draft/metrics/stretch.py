@@ -198,6 +198,7 @@ class Search:
         self.frames: list[Frame] = [g.ORIGIN] * self.n
         self.length = g.norm(of.tip) + g.total(g.norm(one.place[0]) for one in self.of[1:])
         self._rising: Mask = True
+        self._last = 0  # joint whose frame and tip are those of all angles
         self._inward()
         self._outward()
         first = self.of[0]
@@ -222,7 +223,7 @@ class Search:
             if not some(self._rising):
                 break
             before = after
-        self._inward()
+        self._last = last
 
     def _run_coupled(self) -> None:
         """Turn one driven joint after the other, with those that follow it, by trial of angles.
@@ -300,12 +301,13 @@ class Search:
         if step is not None:
             self.angles[j] = where(self._rising, step(j), self.angles[j])
 
-    def reach(self, j: int = 0) -> Value:
+    def reach(self, last: int | None = None) -> Value:
         """Distance of the tip from the shoulder along the horizontal [m].
 
         Args:
-            j: a joint whose frame and tip are those of all angles.
+            last: the joint that the last sweep ended with; None for that of the search.
         """
+        j = self._last if last is None else last
         return self._circle(j).distance(self.angles[j])
 
     def _circle(self, j: int) -> _Circle:
@@ -358,10 +360,11 @@ class Search:
             size = maximum(hypot(x, y), tiny)
         (ax, ay), (bx, by) = circle.radial, circle.across
         a, b = (x * ax + y * ay) / size, (x * bx + y * by) / size
-        ahead, _ = self._best(j, a, b, 1.0)
-        back, _ = self._best(j, -a, -b, 1.0)
+        idle = hypot(a, b) <= _TINY * self.length
+        past = (atan2(b, a) - self.of[j].low) % (2.0 * math.pi)
+        ahead, back = self._within(j, past), self._within(j, (past + math.pi) % (2.0 * math.pi))
         gain = circle.distance(back) - circle.distance(ahead)
-        return where(gain > tiny, back, ahead)
+        return where(idle, self.angles[j], where(gain > tiny, back, ahead))
 
     def _best(self, j: int, a: Value, b: Value, unit: Value) -> tuple[Value, Mask]:
         """Angle q in the range of a joint at which a cos q + b sin q is largest.
@@ -372,15 +375,18 @@ class Search:
             b: motion of the tip along the direction, with the joint at zero.
             unit: size of the direction.
         """
-        one = self.of[j]
         idle = hypot(a, b) <= _TINY * self.length * unit
-        past = (atan2(b, a) - one.low) % (2.0 * math.pi)
+        best = self._within(j, (atan2(b, a) - self.of[j].low) % (2.0 * math.pi))
+        return where(idle, self.angles[j], best), idle
+
+    def _within(self, j: int, past: Value) -> Value:
+        """Angle in the range of a joint nearest to one that is so far past its lower end [rad]."""
+        one = self.of[j]
         span = one.high - one.low
         # Beyond the range the nearer end is best; the lower of two that are as near.
         nearer = past - span < 2.0 * math.pi - past - _TINY
         inside = either(past <= span, nearer)
-        best = one.low + where(inside, where(past <= span, past, span), 0.0)
-        return where(idle, self.angles[j], best), idle
+        return one.low + where(inside, where(past <= span, past, span), 0.0)
 
 
 def turned(axis: Vector, angle: Value, v: Vector) -> Vector:
