@@ -10,6 +10,8 @@ import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from draft.errors import DraftError
 from draft.extras import need
 from draft.serving.addresses import check_free, not_served
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
     Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
+_FROM = (1.2, -1.4, 0.7)  # The camera at first, from what is shown, per its size.
 # Where this machine reaches a server that listens at all its addresses.
 _EVERYWHERE = {"": "127.0.0.1", "0.0.0.0": "127.0.0.1", "::": "::1"}
 
@@ -80,6 +83,9 @@ class Server:
         Raises:
             KeyboardInterrupt: always, at the end.
         """
+        camera, center = self.viser.initial_camera, np.asarray(model.stat.center)
+        camera.look_at = center
+        camera.position = center + model.stat.extent * np.array(_FROM)
         viewer = need("mjviser", "view").Viewer(model, data, server=self.viser, **callbacks)
         # The viewer catches Ctrl-C, stops viser, which prints a message, and returns.
         with contextlib.redirect_stdout(io.StringIO()):
