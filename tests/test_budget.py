@@ -28,7 +28,7 @@ BUDGET = {
     "metrics": 3_200,
     "model": 4_090,
     "reporting": 1_820,
-    "serving": 550,
+    "serving": 560,
     "spec": 5_170,
     "studio": 3_160,
     "study": 6_470,
