@@ -10,6 +10,7 @@ import types
 from typing import Any
 
 import glfw
+import numpy as np
 import pytest
 
 from draft.learn.policy.policy import FAMILY
@@ -29,6 +30,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     class Server:
         def __init__(self, **options: Any) -> None:
             asked.update(options)
+            asked["camera"] = self.initial_camera = types.SimpleNamespace()
 
         def get_port(self) -> int:
             return asked["port"]
@@ -57,6 +59,18 @@ def test_the_page_is_served_to_this_machine_only(served: dict[str, Any], command
     assert served["stopped"]
     assert served["bodies"] == 5
     assert "http://127.0.0.1:8123" in said.out
+
+
+def test_the_camera_is_near_a_small_robot_and_far_from_a_large_one(
+    served: dict[str, Any], command: Command
+) -> None:
+    away = {}
+    for name in ("hand", "humanoid"):
+        command(f"view {name} --web --port 8123", code=130)
+        camera = served["camera"]
+        away[name] = float(np.linalg.norm(camera.position - camera.look_at))
+    assert away["hand"] < 1.2
+    assert 2.0 < away["humanoid"] < 6.0
 
 
 @pytest.mark.parametrize(

@@ -216,14 +216,13 @@ class Search:
         self._inward(self._stretch)
         before = self.reach()
         for k in range(2 * SWEEPS):
-            sweep, last = (self._inward, 0) if k % 2 else (self._outward, self.n - 1)
+            sweep, self._last = (self._inward, 0) if k % 2 else (self._outward, self.n - 1)
             sweep(self._turn)
-            after = self.reach(last)
+            after = self.reach()
             self._rising = after - before > _STILL * self.length
             if not some(self._rising):
                 break
             before = after
-        self._last = last
 
     def _run_coupled(self) -> None:
         """Turn one driven joint after the other, with those that follow it, by trial of angles.
@@ -301,14 +300,9 @@ class Search:
         if step is not None:
             self.angles[j] = where(self._rising, step(j), self.angles[j])
 
-    def reach(self, last: int | None = None) -> Value:
-        """Distance of the tip from the shoulder along the horizontal [m].
-
-        Args:
-            last: the joint that the last sweep ended with; None for that of the search.
-        """
-        j = self._last if last is None else last
-        return self._circle(j).distance(self.angles[j])
+    def reach(self) -> Value:
+        """Distance of the tip from the shoulder along the horizontal [m]."""
+        return self._circle(self._last).distance(self.angles[self._last])
 
     def _circle(self, j: int) -> _Circle:
         """Circle on which a joint moves the tip, seen from above."""
