@@ -19,7 +19,7 @@ from draft.design.design import Design, SegmentMass
 from draft.design.filter_actuators import ROUNDING, actuator, unused, used
 from draft.design.filter_shape import below_floor, feet, off_tip, sections
 from draft.design.findings import Finding, each, note
-from draft.design.legs import count, follows
+from draft.design.legs import count, coupled_bodies
 from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
@@ -191,19 +191,15 @@ def _whole(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
             "no limb reaches the ground; the structure trends do not apply",
             f"survey of {population.name}s",
         )
-    for i in design.feet:
-        above: int | None = i
-        while above is not None:
-            if follows(body := design.bodies[above]):
-                yield from note(
-                    "coupled_leg",
-                    body.name,
-                    True,
-                    f"the joint of '{body.name}' follows another: loads, jump and speed of such a "
-                    "leg are not judged",
-                    "closed forms of legs",
-                )
-            above = body.parent
+    for body in coupled_bodies(design):
+        yield from note(
+            "coupled_leg",
+            body.name,
+            True,
+            f"the joint of '{body.name}' follows another: loads, jump and speed of such a leg are "
+            "not judged",
+            "closed forms of legs",
+        )
     legs = count(design) if population.name == "quadruped" else 0
     if 0 < legs < LEAST_LEGS:
         yield from feet(design, plan, home)

@@ -127,7 +127,14 @@ def runs_of_legs(design: Design) -> list[list[tuple[int, ...]]]:
     return known
 
 
-def _find_runs(design: Design) -> list[list[tuple[int, ...]]]:
+def coupled_bodies(design: Design) -> list[Body]:
+    """Bodies of legs whose joints follow others; what such a leg can do is not judged."""
+    bodies = [design.bodies[k] for run in _every_run(design) for k in run]
+    return [body for body in bodies if _follows(body)]
+
+
+def _every_run(design: Design) -> list[tuple[int, ...]]:
+    """Legs as runs of bodies, also those in which joints follow others."""
     kinds = {segment.label: segment.kind for segment in design.segments}
     by_knee: dict[int, list[int]] = {}
     for i in design.feet:
@@ -139,11 +146,13 @@ def _find_runs(design: Design) -> list[list[tuple[int, ...]]]:
                 by_knee.setdefault(k, path)
                 break
     uses = Counter(k for path in by_knee.values() for k in path)
-    runs = [tuple(k for k in path if k and uses[k] == 1) for path in by_knee.values()]
-    runs = [run for run in runs if not any(map(follows, (design.bodies[k] for k in run)))]
+    return [tuple(k for k in path if k and uses[k] == 1) for path in by_knee.values()]
+
+
+def _find_runs(design: Design) -> list[list[tuple[int, ...]]]:
     grouped: dict[object, list[tuple[int, ...]]] = {}
-    for run in runs:
-        if run:
+    for run in _every_run(design):
+        if run and not any(_follows(design.bodies[k]) for k in run):
             grouped.setdefault(_key(design, run[0]), []).append(run)
     return list(grouped.values())
 
@@ -226,8 +235,7 @@ def _joints(
     return tuple(found)
 
 
-def follows(body: Body) -> bool:
-    """Whether the joint of a body follows another one."""
+def _follows(body: Body) -> bool:
     return body.joint is not None and body.joint.follows is not None
 
 

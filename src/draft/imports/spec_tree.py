@@ -16,7 +16,7 @@ from draft.imports.anatomy import ROLLING, WHEEL, run
 from draft.imports.attachments import Attachments, opposite, side_of
 from draft.imports.bends import held_bends
 from draft.imports.ends import FINGER, Node
-from draft.imports.formatting import NAMED, Parameters, Record, along, direction, vector
+from draft.imports.formatting import NAMED, Parameters, Record, along, direction, tidy, vector
 from draft.imports.home import home_pose
 from draft.imports.knees import Knees
 from draft.imports.motors import Motor
@@ -312,10 +312,10 @@ class Writer:
         elif body.joint is not None and body.joint.limits is None and not body.coupled:
             joint["type"] = "continuous"
         if body.joint is not None and body.joint.mimics:
-            leader, ratio = body.joint.mimics, float(f"{body.joint.ratio:.6g}")
+            leader, ratio = body.joint.mimics, tidy(body.joint.ratio, 6)
             follows: Node = {"joint": own.get(leader, leader), "ratio": ratio}
             if body.joint.offset:
-                follows["offset"] = float(f"{body.joint.offset:.6g}")
+                follows["offset"] = tidy(body.joint.offset, 6)
             if leader not in own:
                 self.followers.append(follows)
             return joint | {"axis": axis, "follows": follows}
