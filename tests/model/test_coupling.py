@@ -372,6 +372,29 @@ def test_a_robot_on_legs_with_a_coupled_joint_has_no_legs_that_are_judged() -> N
     assert finding.where == "shank"
 
 
+def test_a_coupled_waist_above_the_legs_leaves_them_judged() -> None:
+    legs = [
+        {"chain": "leg", "prefix": f"{side}_", "at": [0, y, -0.2]}
+        for side, y in (("left", 0.2), ("right", -0.2))
+    ]
+    follows = {"joint": "lead", "ratio": -0.5}
+    waist = {
+        "name": "waist",
+        "joint": {"name": "waist", "axis": "z", "follows": follows},
+        "link": {"axis": "z", "length": 0.05, "mass": 0.5},
+        "children": legs,
+    }
+    lead = {
+        "name": "lead",
+        "joint": {"name": "lead", "axis": "z", "range": [-1, 1]},
+        "link": {"axis": "z", "length": 0.05, "mass": 0.1},
+        "children": [waist],
+    }
+    design = robot(children=[lead]).resolve()
+    assert count(design) == 2
+    assert "coupled_leg" not in ids(design)
+
+
 # --- what is refused -----------------------------------------------------------------------
 
 
