@@ -333,12 +333,11 @@ class Writer:
     def middle(self, nodes: list[Node], body: Body, below: Body, name: str) -> None:
         """Add to the last node the member to the next joint, and that joint's motor."""
         node, way = nodes[-1], below.anchor - body.anchor
-        if not below.driven and not below.merged:
-            node["link"] = self.member(body, way, name)
+        if not below.driven:
+            if below.slides or not below.merged:
+                node["link"] = self.member(body, way, name)
             return
         bends = [] if body.slides else held_bends(self.reduced, body, below)
-        if not below.driven:
-            return
         motor: Node = {"actuator": self.drive(below), "axis": direction(below.axis)}
         if below.merged:
             if np.any(way):
