@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from html import escape
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; "
 _PICTURES = "img-src data:"
 # Plotly saves pictures as blobs.
 _SCRIPTS = "script-src 'unsafe-inline'; img-src data: blob:"
+# MuJoCo's bindings make functions from strings, which are their own.
+_MODULES = "script-src 'self' data: 'unsafe-eval'"
 
 
 def webpage(
-    title: str, style: str, body: str, scripts: Sequence[str] = (), requests: bool = False
+    title: str,
+    style: str,
+    body: str,
+    scripts: Sequence[str] = (),
+    requests: bool = False,
+    modules: Mapping[str, str] | None = None,
 ) -> str:
     """Text of an HTML page whose content policy forbids a browser to load anything else.
 
@@ -22,9 +30,13 @@ def webpage(
         body: HTML of the body, without its scripts.
         scripts: JavaScript that runs at the end of the body; without any, scripts are forbidden.
         requests: whether scripts may send requests to the server of the page.
+        modules: address of each module by the name that `import` gives it, for scripts that are
+            modules and may compile WebAssembly; None for plain scripts.
     """
     policy = _POLICY + (_SCRIPTS if scripts else _PICTURES)
+    policy = policy if modules is None else policy.replace("script-src", _MODULES)
     policy += "; connect-src 'self'" if requests else ""
+    kind = "" if modules is None else ' type="module"'
     return "\n".join(
         [
             '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
@@ -32,9 +44,15 @@ def webpage(
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             '<link rel="icon" href="data:,">',
             f"<title>{escape(title)}</title>",
-            f"<style>\n{style}</style>\n</head>\n<body>",
+            f"<style>\n{style}</style>",
+            *([] if modules is None else [f'<script type="importmap">{_imports(modules)}</script>']),
+            "</head>\n<body>",
             body,
-            *(f"<script>{script}</script>" for script in scripts),
+            *(f"<script{kind}>{script}</script>" for script in scripts),
             "</body>\n</html>\n",
         ]
     )
+
+
+def _imports(modules: Mapping[str, str]) -> str:
+    return json.dumps({"imports": dict(modules)})

@@ -66,7 +66,7 @@ def subjects(
     if any(design.count is not None for design in designs):
         raise DraftError("a report is about single designs", "select one: design[0]")
     found = []
-    for i, (design, title) in enumerate(zip(designs, _titles(designs), strict=True)):
+    for i, (design, title) in enumerate(zip(designs, titles(designs), strict=True)):
         model = design.build() if design.accepted else _preview(design)
         values = of_model(model) if model is not None and design.accepted else of_design(design)
         metrics = {name: scalar(value) for name, value in values.items()}
@@ -108,7 +108,7 @@ def table(found: Sequence[Subject], compared: DesignComparison | None) -> dict[s
     }
 
 
-def _titles(designs: Sequence[Design]) -> list[str]:
+def titles(designs: Sequence[Design]) -> list[str]:
     """Unique titles: the name of the robot, of the design, or both."""
     robots = {design.name for design in designs}
     titles: list[str] = []

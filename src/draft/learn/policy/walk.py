@@ -26,8 +26,8 @@ _FULL = 0.999  # Share of the largest torque that counts as the limit.
 _ROUNDING = 1e-9  # Share of the peak torque by which torques at a limit may be off it.
 _BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 _DIVERGED = [int(getattr(mujoco.mjtWarning, name)) for name in _BAD]
-_FLOOR = "floor"
-_FALL = Episodes()  # Criteria of a fall are those of training.
+FLOOR = "floor"
+FALL = Episodes()  # Criteria of a fall are those of training.
 
 
 class Walk:
@@ -39,6 +39,7 @@ class Walk:
         fit: the policy and its region of validity.
         model: MuJoCo model of robot and plane.
         data: state of the model.
+        home: position `qpos` of the home pose [m, rad], shape (nq,).
         command: commanded vx, vy [m/s], wz [rad/s]; may be changed at any time.
         falls: number of falls so far.
         first_fall: time of the first of them [s]; None before it.
@@ -74,7 +75,7 @@ class Walk:
         place = self.data.qpos[:2].copy()
         time = self.data.time
         self.controller.reset(self.data, self._seed)
-        self.data.qpos[: len(self._home)] = self._home
+        self.data.qpos[: len(self.home)] = self.home
         self.data.qpos[:2] = place
         self._offset_joints()
         self.data.time = time
@@ -167,12 +168,12 @@ class Walk:
         self.controller = Controller(fit.policy, compiled)
         self.fit, self.model, self.data = fit, compiled, data
         self._robot = model.mujoco
-        self._home = home_position(model.design)
-        if not self._home[7:].any():  # No home pose is stated: that of the policy is the crouch.
-            self._home[self.controller.positions] = fit.policy.home
-            self._home[2] = fit.height
+        self.home = home_position(model.design)
+        if not self.home[7:].any():  # No home pose is stated: that of the policy is the crouch.
+            self.home[self.controller.positions] = fit.policy.home
+            self.home[2] = fit.height
         self._trunk = compiled.body(model.design.bodies[0].name).id
-        self._floor = compiled.geom(_FLOOR).id
+        self._floor = compiled.geom(FLOOR).id
         steps = round(WINDOW / fit.policy.timestep)
         if self._loads.maxlen != steps:
             self._loads = deque(maxlen=steps)
@@ -211,16 +212,20 @@ class Walk:
 
     def _fallen(self) -> bool:
         up = float(self.data.xmat[self._trunk][8])
-        low = float(self.data.xpos[self._trunk, 2]) < _FALL.low * self._home[2]
-        return low or up < np.cos(_FALL.tilt)
+        low = float(self.data.xpos[self._trunk, 2]) < FALL.low * self.home[2]
+        return low or up < np.cos(FALL.tilt)
+
+
+def plane_xml(model: Model) -> str:
+    """MJCF text of a robot on a plane, the first geom, which is called `FLOOR`."""
+    floor = f'<worldbody>\n    <geom name="{FLOOR}" type="plane" size="0 0 0.05"/>'
+    return model.xml.replace("<worldbody>", floor, 1)
 
 
 def _on_plane(model: Model) -> mujoco.MjModel:
     """Compile a robot on a plane."""
-    spec = mujoco.MjSpec.from_string(model.xml)
-    spec.worldbody.add_geom(name=_FLOOR, type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 0.05))
     try:
-        return spec.compile()
+        return mujoco.MjModel.from_xml_string(plane_xml(model))
     except ValueError as error:
         cause = f"MuJoCo does not accept the robot on a plane: {' '.join(str(error).split())}"
         raise DraftError(cause, "undo the change") from None

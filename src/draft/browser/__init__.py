@@ -1,0 +1,1 @@
+"""Robots that walk under live physics in a web page, without a server."""

@@ -1,0 +1,199 @@
+// The page: robots that walk side by side in real time, and the panel beside them.
+import loadMujoco from "mujoco";
+import { Limits } from "draft/limits";
+import { page, part } from "draft/load";
+import { Network } from "draft/network";
+import { Picture } from "draft/picture";
+import { Robot } from "draft/robot";
+import { Steering } from "draft/steer";
+
+const LATE = 0.1; // Time that is caught up with at most [s].
+const PUSH = 0.35; // Velocity of a push per sqrt(g L) of the legs.
+const SMOOTH = 0.03; // Weight of the newest speed in the one that is shown.
+const $ = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
+
+/**
+ * An element with a text, which is never read as HTML.
+ * @param {string} tag
+ * @param {string} text
+ * @param {string} kind class of it
+ */
+function element(tag, text, kind = "") {
+  const made = document.createElement(tag);
+  made.textContent = text;
+  if (kind) made.className = kind;
+  return made;
+}
+
+class Page {
+  /**
+   * @param {any} mujoco
+   * @param {(Network | null)[]} networks
+   */
+  constructor(mujoco, networks) {
+    this.robots = page.robots.map((/** @type {any} */ one, /** @type {number} */ i) =>
+      new Robot(mujoco, one, networks[i], one.numbers));
+    this.shown = 0; // Robot of the panel.
+    this.speeds = this.robots.map(() => 0);
+    this.slow = 1;
+    this.owed = 0;
+    this.last = 0;
+    this.count = { pictures: 0, simulated: 0, wall: 0 };
+    this.limits = new Limits($("limits"));
+    const sliders = ["forward", "left", "turn"].map($);
+    const fastest = Math.max(0.1, ...page.robots.map((/** @type {any} */ one) => one.policy?.forward ?? 0));
+    [fastest, Math.min(0.6 * fastest, 0.6), 1].forEach((end, i) => {
+      Object.assign(sliders[i], { min: -end, max: end, step: end / 100, value: 0 });
+    });
+    this.steering = new Steering(sliders, { push: (side) => this.push(side), changed: () => this.steer() });
+    this.buttons();
+    this.choose(0);
+    this.open();
+    this.picture = new Picture($("view"));
+    this.picture.show(this.robots, page.robots.map((/** @type {any} */ one) => one.color), page.lanes);
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  buttons() {
+    $("push").addEventListener("click", () => this.push(1));
+    $("stand").addEventListener("click", () => { this.steering.command = [0, 0, 0]; });
+    $("restart").addEventListener("click", () => this.robots.forEach((/** @type {Robot} */ one) => one.restart()));
+    $("slow").addEventListener("input", () => this.steer());
+    page.robots.forEach((/** @type {any} */ one, /** @type {number} */ i) => {
+      const tab = element("button", one.title);
+      tab.style.setProperty("--own", one.color);
+      tab.addEventListener("click", () => this.choose(i));
+      $("robots").append(tab);
+    });
+    $("robots").hidden = page.robots.length < 2;
+  }
+
+  /** Commands as the sliders have them, to all robots and to the link. */
+  steer() {
+    const command = this.steering.command;
+    for (const robot of this.robots) {
+      // Each is asked for no more than it was trained for.
+      const most = robot.policy?.forward ?? 0;
+      robot.command = [Math.min(most, Math.max(-most, command[0])), command[1], command[2]];
+    }
+    ["m/s", "m/s", "rad/s"].forEach((unit, i) => {
+      $(`${["forward", "left", "turn"][i]}-out`).textContent = `${command[i].toFixed(2)} ${unit}`;
+    });
+    this.slow = Number($("slow").value);
+    $("slow-out").textContent = this.slow ? `${this.slow.toFixed(2)} x` : "paused";
+    this.link();
+  }
+
+  /** @param {number} side 1 to the left, -1 to the right */
+  push(side) {
+    for (const robot of this.robots)
+      if (robot.policy) robot.push(0, side * PUSH * Math.sqrt(9.81 * robot.height));
+  }
+
+  /** Take the values of the link, within their ranges. */
+  open() {
+    const given = new URLSearchParams(location.hash.slice(1)), said = [];
+    const usual = { forward: 0.5 * Number($("forward").max), left: 0, turn: 0, slow: 1 };
+    for (const [name, value] of Object.entries(usual)) {
+      const slider = $(name), asked = given.has(name) ? Number(given.get(name)) : value;
+      slider.value = String(Number.isFinite(asked) ? asked : value); // A slider keeps to its range.
+      if (!(Math.abs(Number(slider.value) - asked) <= Number(slider.step)))
+        said.push(`${name} is ${Number(slider.value).toPrecision(3)}, not ${given.get(name)}`);
+    }
+    for (const name of given.keys()) if (name && !(name in usual)) said.push(`there is no ${name}`);
+    if (said.length) $("note").textContent = `Of the link: ${said.join("; ")}.`;
+    this.steer();
+  }
+
+  /** Write the values to the link. */
+  link() {
+    const values = ["forward", "left", "turn", "slow"].map((name) => [name, String(Number(Number($(name).value).toFixed(3)))]);
+    history.replaceState(null, "", `#${new URLSearchParams(values)}`);
+  }
+
+  /** @param {number} index robot whose numbers the panel shows */
+  choose(index) {
+    this.shown = index;
+    this.limits.clear();
+    const one = page.robots[index];
+    [...$("robots").children].forEach((tab, i) => tab.classList.toggle("chosen", i === index));
+    $("name").textContent = one.title;
+    $("mass").textContent = `${one.mass.toFixed(2)} kg`;
+    $("why").textContent = one.why ? `It stands: ${one.why}.` : one.outside ? `Its policy is ${one.outside}.` : "";
+    $("findings").replaceChildren(...one.findings.map((/** @type {string[]} */ [severity, id, text]) => {
+      const row = element("li", "", severity);
+      row.append(element("b", id.replaceAll("_", " ")), ` ${text}`);
+      return row;
+    }));
+    $("verdict").textContent = one.accepted ? (one.findings.length ? "It could be built." : "It could be built; no findings.") : "It could not be built:";
+    $("masses").replaceChildren(...Object.entries(one.masses).map(([name, mass]) => {
+      const row = document.createElement("tr");
+      row.append(element("th", name.replaceAll("_", " ")), element("td", `${Number(mass).toFixed(3)} kg`));
+      return row;
+    }));
+    $("load").hidden = !one.policy;
+  }
+
+  /**
+   * Simulate for a while.
+   * @param {number} seconds
+   */
+  advance(seconds) {
+    this.owed = Math.min(this.owed + seconds, LATE);
+    const step = Math.min(...this.robots.map((/** @type {Robot} */ one) => one.policy?.timestep ?? 1));
+    for (; this.owed >= step; this.owed -= step) {
+      for (const robot of this.robots) robot.walk();
+      this.count.simulated += step;
+    }
+    for (const robot of this.robots) robot.refresh();
+  }
+
+  /** @param {number} now [ms] */
+  frame(now) {
+    requestAnimationFrame((next) => this.frame(next));
+    const gone = this.last ? (now - this.last) / 1000 : 0;
+    this.last = now;
+    this.count.wall += gone;
+    this.advance(gone * this.slow);
+    const robot = this.robots[this.shown];
+    if (robot.policy) this.limits.add(robot);
+    this.robots.forEach((/** @type {Robot} */ one, /** @type {number} */ i) => { this.speeds[i] += SMOOTH * (one.speed - this.speeds[i]); });
+    if ($("follow").checked) this.picture.follow();
+    this.picture.draw();
+    if (this.count.pictures++ % 15 === 0) this.report();
+    if ($("load").open) $("busiest").textContent = this.limits.draw(robot) || $("busiest").textContent;
+  }
+
+  report() {
+    const robot = this.robots[this.shown];
+    const falls = robot.falls === 1 ? "1 fall" : `${robot.falls} falls`;
+    $("speed").textContent = robot.policy
+      ? `${this.speeds[this.shown].toFixed(2)} m/s of ${robot.command[0].toFixed(2)} asked, ${falls}`
+      : "It stands.";
+  }
+}
+
+/** @param {any} error */
+function refuse(error) {
+  const text = error?.message ?? String(error);
+  $("note").textContent = /WebGL/i.test(text)
+    ? "This browser offers no WebGL, which the picture needs."
+    : `The page cannot run here: ${text}`;
+}
+
+async function start() {
+  if (typeof WebAssembly !== "object" || typeof DecompressionStream !== "function")
+    throw new Error("it needs WebAssembly and DecompressionStream, of browsers since 2023");
+  const names = [...new Set(page.robots.map((/** @type {any} */ one) => one.network).filter(Boolean))];
+  const [wasmBinary, ...rows] = await Promise.all(["mujoco.wasm", ...names].map(part));
+  const mujoco = await loadMujoco({ wasmBinary, locateFile: () => "" });
+  if (mujoco.mj_versionString() !== page.mujoco)
+    throw new Error(`its MuJoCo is ${mujoco.mj_versionString()}, and the robots are of ${page.mujoco}`);
+  const numbers = new Map(names.map((name, i) => [name, new Float32Array(rows[i])]));
+  const networks = page.robots.map((/** @type {any} */ one) =>
+    one.policy ? Network.read(/** @type {Float32Array} */ (numbers.get(one.network)), one.policy.sizes) : null);
+  $("note").textContent = "";
+  Object.assign(window, { draftPage: new Page(mujoco, networks) }); // For tests and measurements.
+}
+
+start().catch(refuse);

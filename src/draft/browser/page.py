@@ -1,0 +1,189 @@
+"""Web pages in which robots walk under live physics: a folder for any static host, or one file."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import json
+from collections.abc import Sequence
+from importlib.resources import files as resources
+from pathlib import Path
+
+from draft import files
+from draft.browser.engine import drawing, engine
+from draft.browser.robots import PageRobot, network_numbers, robot
+from draft.design import Design
+from draft.design.references import open_designs
+from draft.errors import DraftError
+from draft.extras import own_version
+from draft.learn.policy.reduced import AnyPolicy, open_any
+from draft.plotting import COLORS
+from draft.spec import Spec
+from draft.reporting.subjects import titles
+from draft.webpage import webpage
+
+MOST = 6
+SKILLS = ("walk", "run", "push")
+_MODULES = ("inertia", "limits", "load", "network", "picture", "robot", "steer")
+_GAP = 0.5  # Room between two robots, per width of the wider one.
+_REMEDY = "choose another `out`"
+_MARK = "draft-page.json"  # File by which a folder is known as a page of Draft.
+
+
+def page(
+    designs: Sequence[Design | Spec | str | Path],
+    out: str | Path | None = None,
+    skill: str = "walk",
+    single: bool = False,
+    policies: Sequence[str | Path] = (),
+) -> list[Path]:
+    """Write a web page in which designs walk side by side, under live physics.
+
+        >>> draft.page(["cheetah", "bear"], "site")
+        [PosixPath('site/index.html'), ...]
+
+    Args:
+        designs: 1 to 6 single designs, or their references: "quadruped:bear", a model's folder. A
+            design that no policy drives stands, and the page says why.
+        out: folder of the page; with `single` the file. By default "page" or "page.html".
+        skill: what the shipped policies can do: "walk", "run" or "push".
+        single: whether to write one file that opens from the disk, without a server or a network.
+        policies: ONNX files of policies to walk with before those that ship.
+
+    Returns:
+        The files written, the page first.
+
+    Raises:
+        DraftError: a reference names no design, there are none or too many, MuJoCo does not accept
+            one, the folder holds other files, a file cannot be written, or the extra `page` is not
+            installed or is another MuJoCo.
+    """
+    given = [designs] if isinstance(designs, (Design, Spec, str, Path)) else designs
+    if skill not in SKILLS:
+        cause = f"a page shows no skill '{skill}': its ground is a plane"
+        raise DraftError(cause, f"skills: {', '.join(SKILLS)}")
+    engine()
+    opened = open_designs(given)
+    _check(opened)
+    own = [open_any(file) for file in policies]
+    named = zip(opened, titles(opened), strict=True)
+    robots = [
+        robot(design, title, COLORS[i % len(COLORS)], skill, own)
+        for i, (design, title) in enumerate(named)
+    ]
+    contents = _contents(robots, single)
+    target = Path(out if out is not None else "page.html" if single else "page")
+    if single:
+        files.write(target, contents["index.html"])
+        return [target]
+    _check_folder(target)
+    with files.new_folder(target, _REMEDY) as folder:
+        for name, content in contents.items():
+            (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
+    return [target / name for name in contents]
+
+
+def _check(designs: Sequence[Design]) -> None:
+    if not 1 <= len(designs) <= MOST:
+        cause = f"a page shows 1 to {MOST} designs, not {len(designs)}"
+        raise DraftError(cause, "name fewer, or write several pages")
+    if any(design.count is not None for design in designs):
+        raise DraftError("a page shows single designs", "select one: design[0]")
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse to replace what is not a page written by Draft."""
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise DraftError(f"'{folder}' exists and is not a folder", f"{_REMEDY}, or add --single")
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / _MARK).is_file():
+        cause = f"'{folder}' is not a page that Draft wrote: it has no {_MARK}; it is kept"
+        raise DraftError(cause, f"{_REMEDY}, or empty the folder")
+
+
+def _contents(robots: Sequence[PageRobot], single: bool) -> dict[str, str | bytes]:
+    """Contents of the files by name, the page first."""
+    modules = _modules()
+    parts = {"mujoco.wasm": _packed_engine()}
+    plain = []
+    for one in robots:
+        record = dict(one.plain)
+        if one.fit is not None:
+            numbers = network_numbers(one.fit.policy).astype("<f4").tobytes()
+            name = f"policy-{hashlib.sha256(numbers).hexdigest()[:12]}"
+            parts.setdefault(name, gzip.compress(numbers, 6, mtime=0))
+            record["network"] = name
+        plain.append(record)
+    data = {"mujoco": engine().version, "lanes": _lanes(robots), "robots": plain}
+    body = (resources("draft.browser") / "body.html").read_text("utf-8")
+    body += _inside("draft-page", "application/json", json.dumps(data, allow_nan=False))
+    title = ", ".join(str(one["title"]) for one in plain)
+    style = (resources("draft.browser") / "page.css").read_text("utf-8")
+    if single:
+        inlined = {name: _inlined(text) for name, text in modules.items()}
+        for name, content in parts.items():
+            body += _inside(f"part-{name}", "text/plain", base64.b64encode(content).decode())
+        found = webpage(title, style, body, ['import "draft/main";'], modules=inlined)
+        return {"index.html": found}
+    addresses = {name: f"./{_file(name)}" for name in modules}
+    found = webpage(title, style, body, [_SERVED], requests=True, modules=addresses)
+    mark = json.dumps({"draft": own_version(), "mujoco": engine().version})
+    return {
+        "index.html": found,
+        **{_file(name): text for name, text in modules.items()},
+        **{f"{name}.gz": content for name, content in parts.items()},
+        "LICENSES": _licences(),
+        _MARK: mark + "\n",
+    }
+
+
+# Browsers load no modules from the disk.
+_SERVED = """if (location.protocol === "file:") document.getElementById("note").textContent =
+  "Browsers run a page of several files only from a server: python -m http.server in its folder, \
+or write it with --single.";
+else import("draft/main");"""
+
+
+def _modules() -> dict[str, str]:
+    """Texts of all modules of a page, by the name that `import` gives them."""
+    folder = resources("draft.browser")
+    own = {
+        f"draft/{name}": (folder / f"{name}.js").read_text("utf-8") for name in (*_MODULES, "main")
+    }
+    return {**own, "mujoco": engine().script, **drawing()}
+
+
+def _file(module: str) -> str:
+    return f"{module.removeprefix('draft/').replace('/', '.')}.js"
+
+
+def _inlined(text: str) -> str:
+    return f"data:text/javascript;base64,{base64.b64encode(text.encode()).decode()}"
+
+
+def _inside(name: str, kind: str, text: str) -> str:
+    """A text within the page, from which no tag can lead out."""
+    return f'<script id="{name}" type="{kind}">{text.replace("<", chr(92) + "u003c")}</script>\n'
+
+
+def _packed_engine() -> bytes:
+    return gzip.compress(engine().wasm, 6, mtime=0)
+
+
+def _lanes(robots: Sequence[PageRobot]) -> list[float]:
+    """Places of the robots to the left [m], the first on the left, around 0."""
+    places = [0.0]
+    for before, one in zip(robots, robots[1:], strict=False):
+        a, b = (float(each.plain["width"]) for each in (before, one))
+        places.append(places[-1] - (a + b) / 2 - _GAP * max(a, b))
+    middle = (places[0] + places[-1]) / 2
+    return [place - middle for place in places]
+
+
+def _licences() -> str:
+    own = (resources("draft.browser") / "vendor" / "LICENSE-three").read_text("utf-8")
+    return (
+        "mujoco.js and mujoco.wasm: MuJoCo, Copyright DeepMind Technologies Limited, "
+        "Apache License 2.0, https://www.apache.org/licenses/LICENSE-2.0\n\n"
+        f"three.js and three.core.js:\n\n{own}"
+    )

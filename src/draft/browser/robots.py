@@ -1,0 +1,153 @@
+"""What a page knows of a robot: its model, its policy as plain numbers, and what Draft says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.design import Design
+from draft.errors import DraftError
+from draft.learn.policy.policy import Policy
+from draft.learn.policy.reduced import AnyPolicy
+from draft.learn.policy.validity import Fit, fit
+from draft.learn.policy.walk import FALL, FLOOR, Walk, plane_xml
+from draft.model import Model
+from draft.model.model import preview
+from draft.model.scene import home_position
+from draft.values import Array, scalar
+
+# Terms that the page computes (`robot.js`); the ground is a plane, so none sees heights.
+TERMS = frozenset(
+    {
+        *("base_lin_vel", "base_ang_vel", "projected_gravity", "joint_pos", "joint_vel"),
+        *("actions", "command", "design"),
+    }
+)
+# Numbers of a policy that differ from body to body.
+OF_BODY = (
+    *("sign", "home", "action_scale", "stiffness", "damping"),
+    *("peak_torque", "stall_torque", "no_load_speed", "features"),
+)
+
+
+@dataclass(frozen=True)
+class PageRobot:
+    """A robot of a page.
+
+    Attributes:
+        model: its model; the filter may have refused the design.
+        fit: policy that drives it; None for a robot that stands.
+        plain: what the page reads, without the network.
+    """
+
+    model: Model
+    fit: Fit | None
+    plain: dict[str, Any]
+
+
+def robot(
+    design: Design, title: str, color: str, skill: str = "walk", policies: Sequence[AnyPolicy] = ()
+) -> PageRobot:
+    """Compile a design for a page.
+
+    Args:
+        design: one design; the filter may refuse it.
+        title: what the page calls it.
+        color: colour of its trunk, as "#rrggbb".
+        skill: what its policy can do: "walk", "run" or "push".
+        policies: policies to walk with before those that ship.
+
+    Raises:
+        DraftError: there is no such skill.
+        ModelError: MuJoCo does not accept the robot.
+    """
+    model = design.build() if design.accepted else preview(design)
+    chosen, why = _fitting(model, skill, policies)
+    low, high = _room(model)
+    plain = {
+        "title": title,
+        "color": color,
+        "xml": plane_xml(model),
+        "floor": FLOOR,
+        "trunk": design.bodies[0].name,
+        "size": float(np.linalg.norm(high - low)),
+        "width": float(high[1] - low[1]),
+        "height": float(high[2] + low[2]) / 2,
+        "accepted": bool(design.accepted),
+        "why": why,
+        "outside": "" if chosen is None else chosen.warning,
+        "policy": None,
+        "numbers": {"home_position": home_position(design).tolist()},
+        **said(design),
+    }
+    if chosen is not None:
+        walk = Walk(model, chosen)
+        plain["policy"] = _policy(chosen.policy, walk)
+        plain["numbers"] = body_numbers(chosen, walk)
+    return PageRobot(model, chosen, plain)
+
+
+def said(design: Design) -> dict[str, Any]:
+    """Masses [kg] and findings of a design."""
+    return {
+        "mass": scalar(design.mass),
+        "masses": {name: scalar(mass) for name, mass in design.body_masses().items()},
+        "findings": [[one.severity, one.id, one.message] for one in design.findings],
+    }
+
+
+def body_numbers(chosen: Fit, walk: Walk) -> dict[str, list[float]]:
+    """Numbers of a body that its start and its policy need, by name."""
+    numbers = {name: getattr(chosen.policy, name).astype(float).tolist() for name in OF_BODY}
+    return {"home_position": walk.home.tolist(), **numbers}
+
+
+def network_numbers(policy: Policy) -> NDArray[np.float32]:
+    """Numbers of a policy's network in one row: mean, divisor, then the layers, shape (n,)."""
+    mean, divisor, layers = policy.network.layers()
+    parts = [mean, divisor, *(part for layer in layers for part in layer)]
+    return np.concatenate([np.asarray(part, np.float32).ravel() for part in parts])
+
+
+def _room(model: Model) -> tuple[Array, Array]:
+    """Corners of the room that a robot takes at home [m], each of shape (3,)."""
+    data = mujoco.MjData(model.mujoco)
+    data.qpos[:] = home_position(model.design)
+    mujoco.mj_kinematics(model.mujoco, data)
+    reach = model.mujoco.geom_rbound[:, None]
+    return (data.geom_xpos - reach).min(axis=0), (data.geom_xpos + reach).max(axis=0)
+
+
+def _fitting(
+    model: Model, skill: str, policies: Sequence[AnyPolicy]
+) -> tuple[Fit | None, str]:
+    """The policy of a robot, else None and why it stands."""
+    try:
+        chosen = fit(model, skill, policies)
+    except DraftError as error:
+        return None, error.problems[0].cause
+    unknown = [name for name, _ in chosen.policy.terms if name not in TERMS]
+    if unknown:
+        return None, f"its policy observes {', '.join(unknown)}, which no page computes"
+    return chosen, ""
+
+
+def _policy(policy: Policy, walk: Walk) -> dict[str, Any]:
+    """What the page reads of a policy, without the numbers of its body."""
+    layers = policy.network.layers()[2]
+    return {
+        "joints": list(policy.joints),
+        "terms": [list(term) for term in policy.terms],
+        "rolls": policy.rolls.tolist(),
+        "period": policy.control_period,
+        "timestep": policy.timestep,
+        "forward": policy.forward,
+        "fall": {"low": FALL.low, "tilt": FALL.tilt},
+        "offsets": walk.controller.offsets(0).tolist(),
+        "sizes": [policy.network.size, *(len(bias) for _, bias in layers)],
+    }
