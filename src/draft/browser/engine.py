@@ -60,7 +60,9 @@ def engine() -> Engine:
         # One thread, and a module that needs no other: its runtime serves Node alone.
         if wasm is None or "SharedArrayBuffer" in text or not _RUNTIME.match(text):
             continue
-        return Engine(version, _RUNTIME.sub("const e = null;", text), (assets / wasm[0]).read_bytes())
+        return Engine(
+            version, _RUNTIME.sub("const e = null;", text), (assets / wasm[0]).read_bytes()
+        )
     raise DraftError(f"{assets} holds no MuJoCo that a page can load", "install mjswan 0.12.3")
 
 

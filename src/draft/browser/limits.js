@@ -45,7 +45,7 @@ export class Limits {
     pen.strokeStyle = "#8c959f";
     pen.fillStyle = "#57606a";
     pen.font = "11px system-ui, sans-serif";
-    for (const [text, speed, torque] of [["0", 0, 0], ["½", 0.5, 0], ["no-load speed", 0.85, 0]])
+    for (const [text, speed, torque] of [["0", 0, 0], ["½", 0.5, 0], ["no-load speed", 0.82, 0]])
       pen.fillText(String(text), x(Number(speed)) - 3, low + 14);
     pen.fillText("peak", 0, 14);
     pen.fillText("0", 16, low + 3);

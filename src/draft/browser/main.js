@@ -1,5 +1,6 @@
 // The page: robots that walk side by side in real time, and the panel beside them.
 import loadMujoco from "mujoco";
+import { Bodies } from "draft/bodies";
 import { Limits } from "draft/limits";
 import { page, part } from "draft/load";
 import { Network } from "draft/network";
@@ -29,28 +30,32 @@ class Page {
   /**
    * @param {any} mujoco
    * @param {(Network | null)[]} networks
+   * @param {Bodies | null} bodies of the one robot whose body varies
    */
-  constructor(mujoco, networks) {
+  constructor(mujoco, networks, bodies) {
+    this.bodies = bodies;
     this.robots = page.robots.map((/** @type {any} */ one, /** @type {number} */ i) =>
       new Robot(mujoco, one, networks[i], one.numbers));
+    for (const robot of this.robots) robot.refresh(); // Each model may have grown the memory.
     this.shown = 0; // Robot of the panel.
     this.speeds = this.robots.map(() => 0);
     this.slow = 1;
     this.owed = 0;
     this.last = 0;
-    this.count = { pictures: 0, simulated: 0, wall: 0 };
+    this.count = { pictures: 0, simulated: 0, wall: 0, reshaped: 0 };
     this.limits = new Limits($("limits"));
     const sliders = ["forward", "left", "turn"].map($);
-    const fastest = Math.max(0.1, ...page.robots.map((/** @type {any} */ one) => one.policy?.forward ?? 0));
+    const fastest = Math.max(0.1, ...page.robots.map((/** @type {any} */ one) => one.numbers.forward?.[0] ?? 0));
     [fastest, Math.min(0.6 * fastest, 0.6), 1].forEach((end, i) => {
       Object.assign(sliders[i], { min: -end, max: end, step: end / 100, value: 0 });
     });
     this.steering = new Steering(sliders, { push: (side) => this.push(side), changed: () => this.steer() });
     this.buttons();
-    this.choose(0);
-    this.open();
+    this.shapes();
     this.picture = new Picture($("view"));
     this.picture.show(this.robots, page.robots.map((/** @type {any} */ one) => one.color), page.lanes);
+    this.choose(0);
+    this.open();
     requestAnimationFrame((now) => this.frame(now));
   }
 
@@ -66,6 +71,49 @@ class Page {
       $("robots").append(tab);
     });
     $("robots").hidden = page.robots.length < 2;
+    $("steering").hidden = this.robots.every((/** @type {Robot} */ one) => !one.policy);
+  }
+
+  /** Sliders of the body. */
+  shapes() {
+    $("body").hidden = !this.bodies;
+    for (const { name, unit, nodes, value } of this.bodies?.vary.sliders ?? []) {
+      const label = element("label", name.split(".").at(-1)?.replaceAll("_", " ") ?? name), shown = element("output", "");
+      const slider = document.createElement("input");
+      Object.assign(slider, { type: "range", id: name, min: nodes[0], max: nodes.at(-1), step: "any", value });
+      label.title = name;
+      label.append(" ", shown, slider);
+      slider.addEventListener("input", () => this.reshape());
+      slider.dataset.unit = unit;
+      $("sliders").append(label);
+    }
+    const { errors } = this.bodies?.vary ?? {};
+    if (errors)
+      $("accuracy").textContent = `Between the bodies that Draft compiled, masses are within ${(100 * errors.mass).toFixed(1)} %, ` +
+        `inertias ${(100 * errors.inertia).toFixed(1)} %, lengths ${(1000 * errors.length).toFixed(2)} mm of its own.`;
+  }
+
+  /** Sliders of the body, by name. */
+  get shaped() {
+    return /** @type {HTMLInputElement[]} */ ([...$("sliders").querySelectorAll("input")]);
+  }
+
+  /** Give the robot the body of the sliders. */
+  reshape() {
+    if (!this.bodies) return;
+    const begun = performance.now(), sliders = this.shaped, [robot] = this.robots;
+    const { columns, said, between } = this.bodies.at(sliders.map((slider) => Number(slider.value)));
+    robot.setBody(columns, this.bodies.vary.columns);
+    page.robots[0].said = said;
+    for (const slider of sliders) {
+      const shown = slider.parentElement?.querySelector("output");
+      if (shown) shown.textContent = `${Number(slider.value).toPrecision(3)} ${slider.dataset.unit}`;
+    }
+    this.picture.figures[0].shape();
+    this.choose(0);
+    if (between) $("verdict").textContent = `Between nodes; the nearest one: ${$("verdict").textContent}`;
+    this.steer();
+    this.count.reshaped = performance.now() - begun; // [ms]
   }
 
   /** Commands as the sliders have them, to all robots and to the link. */
@@ -73,7 +121,7 @@ class Page {
     const command = this.steering.command;
     for (const robot of this.robots) {
       // Each is asked for no more than it was trained for.
-      const most = robot.policy?.forward ?? 0;
+      const most = robot.numbers.forward?.[0] ?? 0;
       robot.command = [Math.min(most, Math.max(-most, command[0])), command[1], command[2]];
     }
     ["m/s", "m/s", "rad/s"].forEach((unit, i) => {
@@ -100,14 +148,22 @@ class Page {
       if (!(Math.abs(Number(slider.value) - asked) <= Number(slider.step)))
         said.push(`${name} is ${Number(slider.value).toPrecision(3)}, not ${given.get(name)}`);
     }
-    for (const name of given.keys()) if (name && !(name in usual)) said.push(`there is no ${name}`);
+    for (const slider of this.shaped) {
+      const asked = Number(given.get(slider.id) ?? slider.value);
+      slider.value = String(Number.isFinite(asked) ? asked : slider.value);
+      if (!(Math.abs(Number(slider.value) - asked) < 1e-6)) said.push(`${slider.id} is ${slider.value}, not ${given.get(slider.id)}`);
+    }
+    const known = new Set([...Object.keys(usual), ...this.shaped.map((slider) => slider.id)]);
+    for (const name of given.keys()) if (name && !known.has(name)) said.push(`there is no ${name}`);
     if (said.length) $("note").textContent = `Of the link: ${said.join("; ")}.`;
-    this.steer();
+    if (this.bodies) this.reshape();
+    else this.steer();
   }
 
   /** Write the values to the link. */
   link() {
     const values = ["forward", "left", "turn", "slow"].map((name) => [name, String(Number(Number($(name).value).toFixed(3)))]);
+    for (const slider of this.shaped) values.push([slider.id, String(Number(Number(slider.value).toPrecision(5)))]);
     history.replaceState(null, "", `#${new URLSearchParams(values)}`);
   }
 
@@ -115,20 +171,21 @@ class Page {
   choose(index) {
     this.shown = index;
     this.limits.clear();
-    const one = page.robots[index];
+    const one = page.robots[index], { said } = one, { model } = this.robots[index];
     [...$("robots").children].forEach((tab, i) => tab.classList.toggle("chosen", i === index));
     $("name").textContent = one.title;
-    $("mass").textContent = `${one.mass.toFixed(2)} kg`;
-    $("why").textContent = one.why ? `It stands: ${one.why}.` : one.outside ? `Its policy is ${one.outside}.` : "";
-    $("findings").replaceChildren(...one.findings.map((/** @type {string[]} */ [severity, id, text]) => {
+    const masses = Object.entries(one.bodies).map(([name, id]) => /** @type {const} */ ([name, model.body_mass[id]]));
+    $("mass").textContent = `${masses.reduce((sum, [, mass]) => sum + mass, 0).toFixed(2)} kg`;
+    $("why").textContent = one.why ? `It stands: ${one.why}.` : said.outside ? `This body is ${said.outside}.` : "";
+    $("findings").replaceChildren(...said.findings.map((/** @type {string[]} */ [severity, id, text]) => {
       const row = element("li", "", severity);
       row.append(element("b", id.replaceAll("_", " ")), ` ${text}`);
       return row;
     }));
-    $("verdict").textContent = one.accepted ? (one.findings.length ? "It could be built." : "It could be built; no findings.") : "It could not be built:";
-    $("masses").replaceChildren(...Object.entries(one.masses).map(([name, mass]) => {
+    $("verdict").textContent = said.accepted ? (said.findings.length ? "It could be built." : "It could be built; no findings.") : "It could not be built:";
+    $("masses").replaceChildren(...masses.map(([name, mass]) => {
       const row = document.createElement("tr");
-      row.append(element("th", name.replaceAll("_", " ")), element("td", `${Number(mass).toFixed(3)} kg`));
+      row.append(element("th", name.replaceAll("_", " ")), element("td", `${mass.toFixed(3)} kg`));
       return row;
     }));
     $("load").hidden = !one.policy;
@@ -169,13 +226,14 @@ class Page {
     const falls = robot.falls === 1 ? "1 fall" : `${robot.falls} falls`;
     $("speed").textContent = robot.policy
       ? `${this.speeds[this.shown].toFixed(2)} m/s of ${robot.command[0].toFixed(2)} asked, ${falls}`
-      : "It stands.";
+      : "";
   }
 }
 
 /** @param {any} error */
 function refuse(error) {
   const text = error?.message ?? String(error);
+  console.error(error);
   $("note").textContent = /WebGL/i.test(text)
     ? "This browser offers no WebGL, which the picture needs."
     : `The page cannot run here: ${text}`;
@@ -192,8 +250,9 @@ async function start() {
   const numbers = new Map(names.map((name, i) => [name, new Float32Array(rows[i])]));
   const networks = page.robots.map((/** @type {any} */ one) =>
     one.policy ? Network.read(/** @type {Float32Array} */ (numbers.get(one.network)), one.policy.sizes) : null);
+  const bodies = page.vary ? new Bodies(page.vary, new Float32Array(await part("bodies"))) : null;
   $("note").textContent = "";
-  Object.assign(window, { draftPage: new Page(mujoco, networks) }); // For tests and measurements.
+  Object.assign(window, { draftPage: new Page(mujoco, networks, bodies) }); // For tests and measurements.
 }
 
 start().catch(refuse);

@@ -7,6 +7,7 @@ export class Network {
    * @param {[Float32Array, Float32Array][]} layers weights (outputs x inputs, by rows) and bias
    */
   constructor(mean, divisor, layers) {
+    this.numbers = mean;
     this.mean = mean;
     this.divisor = divisor;
     this.layers = layers;
@@ -23,7 +24,18 @@ export class Network {
     let at = 0;
     const take = (/** @type {number} */ count) => numbers.subarray(at, (at += count));
     const mean = take(sizes[0]), divisor = take(sizes[0]);
-    return new Network(mean, divisor, sizes.slice(1).map((size, i) => [take(size * sizes[i]), take(size)]));
+    const made = new Network(mean, divisor, sizes.slice(1).map((size, i) => [take(size * sizes[i]), take(size)]));
+    made.numbers = numbers;
+    return made;
+  }
+
+  /**
+   * Change some of the numbers of the row.
+   * @param {number[]} places
+   * @param {ArrayLike<number>} values
+   */
+  put(places, values) {
+    places.forEach((at, i) => { this.numbers[at] = values[i]; });
   }
 
   /**

@@ -8,24 +8,27 @@ import hashlib
 import json
 from collections.abc import Sequence
 from importlib.resources import files as resources
+from itertools import pairwise
 from pathlib import Path
 
 from draft import files
 from draft.browser.engine import drawing, engine
+from draft.browser.grid import Grid, grid
 from draft.browser.robots import PageRobot, network_numbers, robot
 from draft.design import Design
 from draft.design.references import open_designs
 from draft.errors import DraftError
 from draft.extras import own_version
-from draft.learn.policy.reduced import AnyPolicy, open_any
+from draft.learn.policy.reduced import open_any
 from draft.plotting import COLORS
-from draft.spec import Spec
 from draft.reporting.subjects import titles
+from draft.spec import Spec
+from draft.variation.axes import Vary
 from draft.webpage import webpage
 
 MOST = 6
 SKILLS = ("walk", "run", "push")
-_MODULES = ("inertia", "limits", "load", "network", "picture", "robot", "steer")
+_MODULES = ("bodies", "inertia", "limits", "load", "network", "picture", "robot", "steer")
 _GAP = 0.5  # Room between two robots, per width of the wider one.
 _REMEDY = "choose another `out`"
 _MARK = "draft-page.json"  # File by which a folder is known as a page of Draft.
@@ -37,6 +40,7 @@ def page(
     skill: str = "walk",
     single: bool = False,
     policies: Sequence[str | Path] = (),
+    vary: Vary = (),
 ) -> list[Path]:
     """Write a web page in which designs walk side by side, under live physics.
 
@@ -50,6 +54,8 @@ def page(
         skill: what the shipped policies can do: "walk", "run" or "push".
         single: whether to write one file that opens from the disk, without a server or a network.
         policies: ONNX files of policies to walk with before those that ship.
+        vary: ranges of up to 5 numbers of one design, which become sliders: words such as
+            "thigh_length=0.2:0.3", or (low, high) by name.
 
     Returns:
         The files written, the page first.
@@ -65,14 +71,15 @@ def page(
         raise DraftError(cause, f"skills: {', '.join(SKILLS)}")
     engine()
     opened = open_designs(given)
-    _check(opened)
+    _check(opened, bool(len(vary)))
     own = [open_any(file) for file in policies]
     named = zip(opened, titles(opened), strict=True)
     robots = [
         robot(design, title, COLORS[i % len(COLORS)], skill, own)
         for i, (design, title) in enumerate(named)
     ]
-    contents = _contents(robots, single)
+    varied = grid(opened[0], vary, skill, own) if len(vary) else None
+    contents = _contents(robots, varied, single)
     target = Path(out if out is not None else "page.html" if single else "page")
     if single:
         files.write(target, contents["index.html"])
@@ -84,7 +91,10 @@ def page(
     return [target / name for name in contents]
 
 
-def _check(designs: Sequence[Design]) -> None:
+def _check(designs: Sequence[Design], varied: bool) -> None:
+    if varied and len(designs) != 1:
+        cause = f"`vary` varies one design, but {len(designs)} are named"
+        raise DraftError(cause, "name one")
     if not 1 <= len(designs) <= MOST:
         cause = f"a page shows 1 to {MOST} designs, not {len(designs)}"
         raise DraftError(cause, "name fewer, or write several pages")
@@ -101,7 +111,9 @@ def _check_folder(folder: Path) -> None:
         raise DraftError(cause, f"{_REMEDY}, or empty the folder")
 
 
-def _contents(robots: Sequence[PageRobot], single: bool) -> dict[str, str | bytes]:
+def _contents(
+    robots: Sequence[PageRobot], varied: Grid | None, single: bool
+) -> dict[str, str | bytes]:
     """Contents of the files by name, the page first."""
     modules = _modules()
     parts = {"mujoco.wasm": _packed_engine()}
@@ -114,7 +126,14 @@ def _contents(robots: Sequence[PageRobot], single: bool) -> dict[str, str | byte
             parts.setdefault(name, gzip.compress(numbers, 6, mtime=0))
             record["network"] = name
         plain.append(record)
-    data = {"mujoco": engine().version, "lanes": _lanes(robots), "robots": plain}
+    if varied is not None:
+        parts["bodies"] = gzip.compress(varied.numbers.astype("<f4").tobytes(), 6, mtime=0)
+    data = {
+        "vary": None if varied is None else varied.plain,
+        "mujoco": engine().version,
+        "lanes": _lanes(robots),
+        "robots": plain,
+    }
     body = (resources("draft.browser") / "body.html").read_text("utf-8")
     body += _inside("draft-page", "application/json", json.dumps(data, allow_nan=False))
     title = ", ".join(str(one["title"]) for one in plain)
@@ -173,7 +192,7 @@ def _packed_engine() -> bytes:
 def _lanes(robots: Sequence[PageRobot]) -> list[float]:
     """Places of the robots to the left [m], the first on the left, around 0."""
     places = [0.0]
-    for before, one in zip(robots, robots[1:], strict=False):
+    for before, one in pairwise(robots):
         a, b = (float(each.plain["width"]) for each in (before, one))
         places.append(places[-1] - (a + b) / 2 - _GAP * max(a, b))
     middle = (places[0] + places[-1]) / 2

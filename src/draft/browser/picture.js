@@ -103,7 +103,7 @@ export class Picture {
     this.scene.add(this.ground);
     /** @type {Figure[]} */
     this.figures = [];
-    this.yaw = -1.15; // Angles of the view [rad], and distance per size.
+    this.yaw = 0; // Angles of the view [rad], and distance per size.
     this.pitch = 0.28;
     this.away = 1;
     this.target = new THREE.Vector3();
@@ -122,6 +122,7 @@ export class Picture {
   show(robots, colors, lanes) {
     this.figures.forEach((one) => one.remove(this.scene));
     this.figures = robots.map((robot, i) => new Figure(this.scene, robot, colors[i], lanes[i]));
+    this.yaw = robots.length > 1 ? -0.55 : -1.15; // Those abreast are seen from ahead.
     this.size = Math.max(...robots.map((robot) => robot.size), (Math.max(...lanes) - Math.min(...lanes)) * 0.75);
     this.scene.fog = new THREE.Fog(SKY, 12 * this.size, 45 * this.size);
     this.follow(true);

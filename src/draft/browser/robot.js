@@ -1,9 +1,13 @@
 // A robot on a plane in MuJoCo, driven by a policy: `draft.learn.policy.walk.Walk` in the browser.
 // Its states, observations, actions and torques are those of the native one (tests/browser).
-import { principal } from "draft/inertia";
+import { principal, tensors, unit } from "draft/inertia";
 
 const CLEAR = 0.005, EVEN = 1e-4; // As in `walk.py`: height above the floor, depth in it [m].
 const DOWN = 1.0; // Time that a fallen robot lies before it starts again [s].
+// The floor is the first geom, which the grid's models, of robots alone, lack.
+const START = /** @type {Record<string, (model: any) => number>} */ ({
+  geom_size: () => 3, geom_pos: () => 3, geom_quat: () => 4, geom_rbound: () => 1, geom_aabb: () => 6,
+});
 const VIEWS = ["qpos", "qvel", "qfrc_applied", "sensordata", "xmat", "xpos", "geom_xpos", "geom_xmat"];
 
 /**
@@ -22,7 +26,9 @@ export class Robot {
    * @param {any} mujoco module of MuJoCo
    * @param {{xml: string, floor: string, trunk: string, size: number, height: number, policy: Policy | null}} robot
    * @param {import("draft/network").Network | null} network
-   * @param {Record<string, number[]>} numbers of the body, see `setNumbers`
+   * @param {Record<string, number[]>} numbers of the body that its start and its policy need, each
+   *   by joint or whole: home_position, forward, sign, home, action_scale, stiffness, damping,
+   *   peak_torque, stall_torque, no_load_speed, features
    */
   constructor(mujoco, robot, network, numbers) {
     this.mujoco = mujoco;
@@ -55,7 +61,9 @@ export class Robot {
     this.observation = new Float32Array(network ? network.mean.length : 0);
     this.period = robot.policy ? Math.round(robot.policy.period / robot.policy.timestep) : 1;
     this.grab();
-    this.setNumbers(numbers);
+    this.numbers = numbers;
+    /** @type {Float64Array | null} Inertias of the bodies, once they vary. */
+    this.tensors = null;
     this.restart();
   }
 
@@ -76,29 +84,54 @@ export class Robot {
   }
 
   /**
-   * Numbers of the body that the policy and the start need, each by joint or whole:
-   * home_position, sign, home, action_scale, stiffness, damping, peak_torque, stall_torque,
-   * no_load_speed, features.
-   * @param {Record<string, number[]>} numbers
+   * Let the body be replaced: what a model remembers of equal frames need not hold for others.
+   * Vertices of the trunk then are in the frame of its body.
    */
-  setNumbers(numbers) {
-    this.numbers = numbers;
+  loosen() {
+    const { model } = this;
+    for (const kind of ["body", "geom", "site"]) model[`${kind}_sameframe`].fill(0);
+    model.opt.disableflags |= this.mujoco.mjtDisableBit.mjDSBL_MIDPHASE.value; // Its boxes turn.
+    this.tensors = tensors(model.body_inertia, model.body_iquat);
+    for (let geom = 0; geom < model.ngeom; geom++) {
+      if (model.geom_type[geom] !== this.mujoco.mjtGeom.mjGEOM_MESH.value) continue;
+      const mesh = model.geom_dataid[geom], start = model.mesh_vertadr[mesh];
+      const [w, x, y, z] = model.geom_quat.slice(4 * geom, 4 * geom + 4), place = model.geom_pos.slice(3 * geom, 3 * geom + 3);
+      for (let i = 3 * start; i < 3 * (start + model.mesh_vertnum[mesh]); i += 3) {
+        const [a, b, c] = model.mesh_vert.slice(i, i + 3);
+        model.mesh_vert.set([
+          place[0] + (1 - 2 * (y * y + z * z)) * a + 2 * (x * y - w * z) * b + 2 * (x * z + w * y) * c,
+          place[1] + 2 * (x * y + w * z) * a + (1 - 2 * (x * x + z * z)) * b + 2 * (y * z - w * x) * c,
+          place[2] + 2 * (x * z - w * y) * a + 2 * (y * z + w * x) * b + (1 - 2 * (x * x + y * y)) * c,
+        ], i);
+      }
+      model.geom_pos.set([0, 0, 0], 3 * geom);
+      model.geom_quat.set([1, 0, 0, 0], 4 * geom);
+    }
   }
 
   /**
    * Replace the body, as `Walk.swap`; position, velocity, command and last action are carried over.
-   * @param {Record<string, ArrayLike<number>>} fields of MjModel
-   * @param {Record<string, number[]>} numbers see `setNumbers`
+   * @param {Record<string, ArrayLike<number>>} columns numbers that vary, by field of MjModel or
+   *   by what the start and the policy need
+   * @param {Record<string, number[]>} places indices of these numbers
    */
-  setBody(fields, numbers) {
+  setBody(columns, places) {
     const { mujoco, model, data } = this;
+    if (!this.tensors) this.loosen();
     mujoco.mj_fwdPosition(model, data);
-    const depth = this.depth();
-    for (const [name, values] of Object.entries(fields)) if (name !== "body_tensor") model[name].set(values);
-    if (fields.body_tensor) principal(fields.body_tensor, model.body_inertia, model.body_iquat);
+    const depth = this.depth(), numbers = { ...this.numbers };
+    for (const [name, values] of Object.entries(columns)) {
+      const put = (/** @type {any} */ to, start = 0) => places[name].forEach((at, i) => { to[start + at] = values[i]; });
+      if (name.startsWith("number ")) put((numbers[name.slice(7)] = [...numbers[name.slice(7)]]));
+      else if (name === "network") this.network?.put(places[name], values);
+      else if (name === "body_tensor") put(this.tensors);
+      else put(model[name], START[name]?.(model) ?? 0);
+    }
+    principal(this.tensors, model.body_inertia, model.body_iquat);
+    for (const name of ["body_quat", "geom_quat"]) if (name in columns) unit(model[name]);
     const state = { qpos: data.qpos.slice(), qvel: data.qvel.slice(), time: data.time };
     mujoco.mj_setConst(model, data);
-    this.setNumbers(numbers);
+    this.numbers = numbers;
     this.grab();
     this.qpos.set(state.qpos);
     this.qvel.set(state.qvel);

@@ -1,4 +1,4 @@
-"""What a page knows of a robot: its model, its policy as plain numbers, and what Draft says of it."""
+"""What a page knows of a robot: its model, its policy as numbers, and what Draft says of it."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from draft.errors import DraftError
 from draft.learn.policy.policy import Policy
 from draft.learn.policy.reduced import AnyPolicy
 from draft.learn.policy.validity import Fit, fit
-from draft.learn.policy.walk import FALL, FLOOR, Walk, plane_xml
+from draft.learn.policy.walk import FALL, FLOOR, Walk, plane_xml, start_position
 from draft.model import Model
 from draft.model.model import preview
 from draft.model.scene import home_position
-from draft.values import Array, scalar
+from draft.values import Array
 
 # Terms that the page computes (`robot.js`); the ground is a plane, so none sees heights.
 TERMS = frozenset(
@@ -78,33 +78,36 @@ def robot(
         "size": float(np.linalg.norm(high - low)),
         "width": float(high[1] - low[1]),
         "height": float(high[2] + low[2]) / 2,
-        "accepted": bool(design.accepted),
         "why": why,
-        "outside": "" if chosen is None else chosen.warning,
         "policy": None,
         "numbers": {"home_position": home_position(design).tolist()},
-        **said(design),
+        "bodies": {body.name: int(model.mujoco.body(body.name).id) for body in design.bodies},
+        "said": said(design, chosen),
     }
     if chosen is not None:
-        walk = Walk(model, chosen)
-        plain["policy"] = _policy(chosen.policy, walk)
-        plain["numbers"] = body_numbers(chosen, walk)
+        plain["policy"] = _policy(chosen.policy, Walk(model, chosen))
+        plain["numbers"] = body_numbers(model, chosen)
     return PageRobot(model, chosen, plain)
 
 
-def said(design: Design) -> dict[str, Any]:
-    """Masses [kg] and findings of a design."""
+def said(design: Design, chosen: Fit | None) -> dict[str, Any]:
+    """What Draft says of a design and of the policy that drives it."""
     return {
-        "mass": scalar(design.mass),
-        "masses": {name: scalar(mass) for name, mass in design.body_masses().items()},
+        "accepted": bool(design.accepted),
         "findings": [[one.severity, one.id, one.message] for one in design.findings],
+        "outside": "" if chosen is None else chosen.warning,
     }
 
 
-def body_numbers(chosen: Fit, walk: Walk) -> dict[str, list[float]]:
+def body_numbers(model: Model, chosen: Fit) -> dict[str, list[float]]:
     """Numbers of a body that its start and its policy need, by name."""
-    numbers = {name: getattr(chosen.policy, name).astype(float).tolist() for name in OF_BODY}
-    return {"home_position": walk.home.tolist(), **numbers}
+    policy = chosen.policy
+    numbers = {name: getattr(policy, name).astype(float).tolist() for name in OF_BODY}
+    return {
+        "home_position": start_position(model, chosen).tolist(),
+        "forward": [policy.forward],
+        **numbers,
+    }
 
 
 def network_numbers(policy: Policy) -> NDArray[np.float32]:
@@ -123,18 +126,20 @@ def _room(model: Model) -> tuple[Array, Array]:
     return (data.geom_xpos - reach).min(axis=0), (data.geom_xpos + reach).max(axis=0)
 
 
-def _fitting(
-    model: Model, skill: str, policies: Sequence[AnyPolicy]
-) -> tuple[Fit | None, str]:
+def _fitting(model: Model, skill: str, policies: Sequence[AnyPolicy]) -> tuple[Fit | None, str]:
     """The policy of a robot, else None and why it stands."""
     try:
         chosen = fit(model, skill, policies)
     except DraftError as error:
         return None, error.problems[0].cause
-    unknown = [name for name, _ in chosen.policy.terms if name not in TERMS]
-    if unknown:
-        return None, f"its policy observes {', '.join(unknown)}, which no page computes"
-    return chosen, ""
+    why = unknown_terms(chosen.policy)
+    return (None, why) if why else (chosen, "")
+
+
+def unknown_terms(policy: Policy) -> str:
+    """Why a page cannot run a policy; "" if it can."""
+    unknown = [name for name, _ in policy.terms if name not in TERMS]
+    return f"its policy observes {', '.join(unknown)}, which no page computes" if unknown else ""
 
 
 def _policy(policy: Policy, walk: Walk) -> dict[str, Any]:
@@ -146,7 +151,6 @@ def _policy(policy: Policy, walk: Walk) -> dict[str, Any]:
         "rolls": policy.rolls.tolist(),
         "period": policy.control_period,
         "timestep": policy.timestep,
-        "forward": policy.forward,
         "fall": {"low": FALL.low, "tilt": FALL.tilt},
         "offsets": walk.controller.offsets(0).tolist(),
         "sizes": [policy.network.size, *(len(bias) for _, bias in layers)],

@@ -94,7 +94,10 @@ class ModelBatch:
 
 
 def build_batch(
-    design: Design, rows: Index | None = None, template: mujoco.MjModel | None = None
+    design: Design,
+    rows: Index | None = None,
+    template: mujoco.MjModel | None = None,
+    refused: bool = False,
 ) -> ModelBatch:
     """Compile N designs of one topology.
 
@@ -102,6 +105,7 @@ def build_batch(
         design: N designs.
         rows: which of them, increasing; all where None.
         template: model of a design of the same spec; of the first that compiles where None.
+        refused: whether to compile those that the filter refuses as well.
 
     Raises:
         DraftError: this is one design, none of them compiles, or the template has another
@@ -113,7 +117,7 @@ def build_batch(
         cause = f"batches follow the compilers of MuJoCo 3 and 4, and this is {mujoco.__version__}"
         raise DraftError(cause, "build the designs one by one: design[i].build()")
     chosen = np.arange(design.count) if rows is None else np.asarray(rows, dtype=np.intp)
-    outside = _refused(design, chosen)
+    outside = {} if refused else _refused(design, chosen)
     outside |= dict.fromkeys(_other_topology(design, chosen), "its topology is not the others'")
     outside |= {row: TWISTED for row in _twisted(design, chosen) if row not in outside}
     if template is None:

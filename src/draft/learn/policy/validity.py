@@ -24,7 +24,14 @@ from draft.learn.bodies.features import features
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.bodies.slots import describe, slots_of
 from draft.learn.policy import policy as shipped
-from draft.learn.policy.matching import Match, match, match_of, structure_of, trained_structure
+from draft.learn.policy.matching import (
+    Match,
+    Structure,
+    match,
+    match_of,
+    structure_of,
+    trained_structure,
+)
 from draft.learn.policy.policy import Policy
 from draft.learn.policy.reduced import AnyPolicy, LegsPolicy, any_legs
 from draft.learn.policy.region import SAME, Departure, Region, departures, limited, sentence
@@ -82,47 +89,97 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[AnyPolicy] = ()) -
         DraftError: no policy drives its joints; the message says why, and names the command that
             trains one.
     """
-    design = model.design
-    cause = f"no policy drives the joints of {design.reference}"
-    try:
-        member = legged_robot(design, model)
-    except DraftError as error:
-        (problem,) = error.problems
-        raise DraftError(replace(problem, cause=f"{cause}: {problem.cause}")) from None
-    own = structure_of(member, model.mujoco)
-    seen = features(member, model.mujoco)
-    found: list[tuple[Policy, Region, Match, tuple[Departure, ...]]] = []
+    return fits([model], skill, policies)[0]
+
+
+def fits(
+    models: Sequence[Model], skill: str = "walk", policies: Sequence[AnyPolicy] = ()
+) -> list[Fit]:
+    """Return the one policy whose region is nearest to all of some designs, for each of them.
+
+    Args:
+        models: the robots.
+        skill: see `fit`.
+        policies: see `fit`.
+
+    Raises:
+        DraftError: no policy drives the joints of them all.
+    """
+    robots = [_Robot.of(model) for model in models]
+    found: list[tuple[Policy, Region, list[tuple[Match, tuple[Departure, ...]]]]] = []
     legs = [(one, str(one.file)) for one in policies if isinstance(one, LegsPolicy)]
     given = [
         (one, Region.of(_title(one), one.known, one))
         for one in policies
         if not isinstance(one, LegsPolicy)
     ]
-    reason = ""
+    reason, undriven = "", models[0]
     for known in (given, () if legs else _regions(skill)):
         for one, region in () if found else known:
-            chosen = match(one.joints, trained_structure(one), member.joints, own)
-            if isinstance(chosen, str):
-                reason = reason or chosen
-                continue
-            outside = *_outside(one, region, member, seen, chosen), *_rubbing(region, design)
-            found.append((one, region, chosen, outside))
+            rows = []
+            for robot in robots:
+                chosen = match(one.joints, trained_structure(one), robot.member.joints, robot.own)
+                if isinstance(chosen, str):
+                    if not reason:
+                        reason, undriven = chosen, robot.model
+                    break
+                outside = _outside(one, region, robot.member, robot.seen, chosen)
+                rows.append((chosen, (*outside, *_rubbing(region, robot.model.design))))
+            else:
+                found.append((one, region, rows))
     if not found:
         if not legs and skill in _OF_ANY_LEGS:
             legs = [(any_legs(), ANY_NAME)]
         try:
-            return _by_slots(*legs[0], model, member, skill)
+            return [_by_slots(*legs[0], robot.model, robot.member, skill) for robot in robots]
         except (DraftError, IndexError) as error:
             if isinstance(error, DraftError):
                 reason = error.problems[0].cause
-            remedy = f"train one: {train_command(design)}"
-            raise DraftError(f"{cause}: {reason}", remedy) from None
-    policy, region, chosen, outside = min(found, key=lambda one: sum(gap.size for gap in one[3]))
-    adapted = _adapted(policy, member, seen, chosen)
-    # The family's policy can also run.
-    if skill == "walk" and not any(policy is one for one in policies):
-        adapted = _slow(adapted, member)
-    return Fit(adapted, region.name, outside, member.height)
+            remedy = f"train one: {train_command(undriven.design)}"
+            raise DraftError(f"{_undriven(undriven)}: {reason}", remedy) from None
+    policy, region, rows = min(
+        found, key=lambda one: sum(gap.size for _, outside in one[2] for gap in outside)
+    )
+    fitted = []
+    for robot, (chosen, outside) in zip(robots, rows, strict=True):
+        adapted = _adapted(policy, robot.member, robot.seen, chosen)
+        # The family's policy can also run.
+        if skill == "walk" and not any(policy is one for one in policies):
+            adapted = _slow(adapted, robot.member)
+        fitted.append(Fit(adapted, region.name, outside, robot.member.height))
+    return fitted
+
+
+@dataclass(frozen=True)
+class _Robot:
+    """A robot that is to be driven.
+
+    Attributes:
+        model: its model.
+        member: it as learning uses it.
+        own: places and axes of its joints.
+        seen: its features.
+    """
+
+    model: Model
+    member: LeggedRobot
+    own: Structure
+    seen: tuple[float, ...]
+
+    @staticmethod
+    def of(model: Model) -> _Robot:
+        try:
+            member = legged_robot(model.design, model)
+        except DraftError as error:
+            (problem,) = error.problems
+            cause = f"{_undriven(model)}: {problem.cause}"
+            raise DraftError(replace(problem, cause=cause)) from None
+        own = structure_of(member, model.mujoco)
+        return _Robot(model, member, own, features(member, model.mujoco))
+
+
+def _undriven(model: Model) -> str:
+    return f"no policy drives the joints of {model.design.reference}"
 
 
 def _by_slots(legs: LegsPolicy, name: str, model: Model, member: LeggedRobot, skill: str) -> Fit:

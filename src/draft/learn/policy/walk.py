@@ -168,10 +168,7 @@ class Walk:
         self.controller = Controller(fit.policy, compiled)
         self.fit, self.model, self.data = fit, compiled, data
         self._robot = model.mujoco
-        self.home = home_position(model.design)
-        if not self.home[7:].any():  # No home pose is stated: that of the policy is the crouch.
-            self.home[self.controller.positions] = fit.policy.home
-            self.home[2] = fit.height
+        self.home = start_position(model, fit)
         self._trunk = compiled.body(model.design.bodies[0].name).id
         self._floor = compiled.geom(FLOOR).id
         steps = round(WINDOW / fit.policy.timestep)
@@ -214,6 +211,16 @@ class Walk:
         up = float(self.data.xmat[self._trunk][8])
         low = float(self.data.xpos[self._trunk, 2]) < FALL.low * self.home[2]
         return low or up < np.cos(FALL.tilt)
+
+
+def start_position(model: Model, fit: Fit) -> Array:
+    """Position `qpos` at which a robot starts to walk [m, rad], shape (nq,)."""
+    home = home_position(model.design)
+    if not home[7:].any():  # No home pose is stated: that of the policy is the crouch.
+        joints = [model.mujoco.joint(name).qposadr[0] for name in fit.policy.joints]
+        home[joints] = fit.policy.home
+        home[2] = fit.height
+    return home
 
 
 def plane_xml(model: Model) -> str:
