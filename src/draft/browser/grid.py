@@ -12,19 +12,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.browser.robots import body_numbers, network_numbers, said, unknown_terms
+from draft.browser.robots import Driven, body_numbers, driven, network_numbers, said
 from draft.design import Design
 from draft.errors import DraftError
 from draft.explore.sensitivity import stated_numbers
 from draft.learn.policy.reduced import AnyPolicy
-from draft.learn.policy.validity import Fit, fits
+from draft.learn.policy.validity import Fit
 from draft.model import Model
 from draft.model.batch import ModelBatch, build_batch
 from draft.model.batch_text import FIELDS
@@ -55,41 +54,42 @@ class Grid:
     """Bodies of a design over a grid.
 
     Attributes:
+        by: policy of the design itself, and then of the nodes.
         plain: what the page reads: sliders, columns, what is said of each node, errors.
         numbers: means of the columns, their components, and each node's coefficients in these, in
             one row, shape (n,).
     """
 
+    by: Driven
     plain: dict[str, Any]
     numbers: NDArray[np.float32]
 
 
-def grid(
-    design: Design, vary: Vary, skill: str = "walk", policies: Sequence[AnyPolicy] = ()
-) -> Grid:
+def grid(model: Model, vary: Vary, skill: str, policies: Sequence[AnyPolicy]) -> Grid:
     """Compile a design over ranges of its numbers.
 
     Args:
-        design: one design, whose other numbers stay as they are.
+        model: the design's model; its other numbers stay as they are.
         vary: ranges of up to 5 numbers, see `draft.variation.axes.parse`.
-        skill: what the policy can do, see `draft.browser.robots.robot`.
-        policies: policies to walk with before those that ship.
+        skill: what the policy can do, see `draft.browser.robots.driven`.
+        policies: see there.
 
     Raises:
         DraftError: a range cannot be used, a body of the grid has no model, or no grid of a page's
             size keeps to the errors of `BARS`.
     """
+    design = model.design
     axes = parse(design.spec, vary)
     _check(axes)
-    space = _Space(design, axes)
+    space = _Space(model, axes)
     nodes, errors = _refined(space)
     table = space.table(nodes)
     names, values, steps = list(table.names), table.values, table.steps
     many = space.designs(nodes)
     models = [preview(many[i]) for i in range(len(values))]
-    found, why = _fits(models, skill, policies)
-    if found:
-        more, extra = _of_policies(found, models)
+    by = driven([model, *models], skill, policies)
+    if by.fits:
+        more, extra = _of_policies(by.fits[1:], models)
         names += more
         values = np.hstack((values, extra))
         steps = np.concatenate((steps, _OTHER * np.maximum(np.abs(extra).max(axis=0), 1e-3)))
@@ -109,14 +109,13 @@ def grid(
         "columns": _columns([names[i] for i in moving]),
         "components": len(parts),
         "errors": errors,
-        "why": why,
         "said": [
-            said(model.design, one)
-            for model, one in zip(models, found or [None] * len(models), strict=True)
+            said(one.design, chosen)
+            for one, chosen in zip(models, by.fits[1:] or [None] * len(models), strict=True)
         ],
     }
     numbers = np.concatenate((mean, parts.ravel(), shares.ravel()))
-    return Grid(plain, numbers.astype(np.float32))
+    return Grid(by, plain, numbers.astype(np.float32))
 
 
 def _check(axes: Sequence[Axis]) -> None:
@@ -149,24 +148,20 @@ class _Space:
     """Designs over ranges.
 
     Attributes:
-        design: the design.
+        model: model of the design itself.
         axes: its ranges.
     """
 
-    design: Design
+    model: Model
     axes: Sequence[Axis]
 
     def designs(self, values: Sequence[Array]) -> Design:
         """N designs at all combinations of values of the axes, the last axis the fastest."""
         mesh = np.meshgrid(*values, indexing="ij")
         given = {axis.name: one.ravel() for axis, one in zip(self.axes, mesh, strict=True)}
-        own = {k: v for k, v in self.design.values.items() if k not in given}
-        return self.design.spec.resolve(own, given)
-
-    @cached_property
-    def template(self) -> mujoco.MjModel:
-        """Model of the design itself."""
-        return preview(self.design).mujoco
+        design = self.model.design
+        own = {k: v for k, v in design.values.items() if k not in given}
+        return design.spec.resolve(own, given)
 
     def table(self, values: Sequence[Array]) -> _Table:
         """Numbers of the bodies at all combinations of values of the axes.
@@ -175,7 +170,7 @@ class _Space:
             DraftError: one has no model.
         """
         many = self.designs(values)
-        batch = build_batch(many, template=self.template, refused=True)
+        batch = build_batch(many, template=self.model.mujoco, refused=True)
         if batch.outside:
             row, reason = next(iter(batch.outside.items()))
             at = np.unravel_index(row, [len(one) for one in values])
@@ -296,18 +291,6 @@ def _errors(table: _Table, ratio: Array) -> dict[str, float]:
         if kind is not None:
             found[kind] = max(found[kind], float(value) * BARS[kind])
     return found
-
-
-def _fits(
-    models: Sequence[Model], skill: str, policies: Sequence[AnyPolicy]
-) -> tuple[list[Fit], str]:
-    """One policy for all bodies, else none, and why they stand."""
-    try:
-        found = fits(models, skill, policies)
-    except DraftError as error:
-        return [], error.problems[0].cause
-    why = unknown_terms(found[0].policy)
-    return ([], why) if why else (found, "")
 
 
 def _of_policies(

@@ -14,7 +14,7 @@ from pathlib import Path
 from draft import files
 from draft.browser.engine import drawing, engine
 from draft.browser.grid import Grid, grid
-from draft.browser.robots import PageRobot, network_numbers, robot
+from draft.browser.robots import PageRobot, compiled, driven, network_numbers, robot
 from draft.design import Design
 from draft.design.references import open_designs
 from draft.errors import DraftError
@@ -73,12 +73,17 @@ def page(
     opened = open_designs(given)
     _check(opened, bool(len(vary)))
     own = [open_any(file) for file in policies]
-    named = zip(opened, titles(opened), strict=True)
+    models = [compiled(design) for design in opened]
+    varied = grid(models[0], vary, skill, own) if len(vary) else None
     robots = [
-        robot(design, title, COLORS[i % len(COLORS)], skill, own)
-        for i, (design, title) in enumerate(named)
+        robot(
+            model,
+            title,
+            COLORS[i % len(COLORS)],
+            driven([model], skill, own) if varied is None else varied.by,
+        )
+        for i, (model, title) in enumerate(zip(models, titles(opened), strict=True))
     ]
-    varied = grid(opened[0], vary, skill, own) if len(vary) else None
     contents = _contents(robots, varied, single)
     target = Path(out if out is not None else "page.html" if single else "page")
     if single:

@@ -14,7 +14,7 @@ from draft.design import Design
 from draft.errors import DraftError
 from draft.learn.policy.policy import Policy
 from draft.learn.policy.reduced import AnyPolicy
-from draft.learn.policy.validity import Fit, fit
+from draft.learn.policy.validity import Fit, fits
 from draft.learn.policy.walk import FALL, FLOOR, Walk, plane_xml, start_position
 from draft.model import Model
 from draft.model.model import preview
@@ -40,34 +40,65 @@ class PageRobot:
     """A robot of a page.
 
     Attributes:
-        model: its model; the filter may have refused the design.
         fit: policy that drives it; None for a robot that stands.
         plain: what the page reads, without the network.
     """
 
-    model: Model
     fit: Fit | None
     plain: dict[str, Any]
 
 
-def robot(
-    design: Design, title: str, color: str, skill: str = "walk", policies: Sequence[AnyPolicy] = ()
-) -> PageRobot:
-    """Compile a design for a page.
+@dataclass(frozen=True)
+class Driven:
+    """The policy that drives some robots.
+
+    Attributes:
+        fits: the policy for each of them; empty where they stand.
+        why: why they stand; "" if they are driven.
+    """
+
+    fits: Sequence[Fit]
+    why: str
+
+
+def driven(models: Sequence[Model], skill: str, policies: Sequence[AnyPolicy]) -> Driven:
+    """One policy for some robots, else why there is none that a page can run.
 
     Args:
-        design: one design; the filter may refuse it.
-        title: what the page calls it.
-        color: colour of its trunk, as "#rrggbb".
-        skill: what its policy can do: "walk", "run" or "push".
+        models: the robots; the filter may have refused them.
+        skill: "walk", "run" or "push".
         policies: policies to walk with before those that ship.
+    """
+    try:
+        found = fits(models, skill, policies)
+    except DraftError as error:
+        return Driven((), error.problems[0].cause)
+    unknown = [name for name, _ in found[0].policy.terms if name not in TERMS]
+    if unknown:
+        return Driven((), f"its policy observes {', '.join(unknown)}, which no page computes")
+    return Driven(found, "")
+
+
+def compiled(design: Design) -> Model:
+    """Model of a design, unchecked if the filter refuses it.
 
     Raises:
-        DraftError: there is no such skill.
         ModelError: MuJoCo does not accept the robot.
     """
-    model = design.build() if design.accepted else preview(design)
-    chosen, why = _fitting(model, skill, policies)
+    return design.build() if design.accepted else preview(design)
+
+
+def robot(model: Model, title: str, color: str, by: Driven) -> PageRobot:
+    """What a page knows of a robot.
+
+    Args:
+        model: the robot.
+        title: what the page calls it.
+        color: colour of its trunk, as "#rrggbb".
+        by: the policy that drives it alone or before others.
+    """
+    design = model.design
+    chosen = by.fits[0] if by.fits else None
     low, high = _room(model)
     plain = {
         "title": title,
@@ -78,7 +109,7 @@ def robot(
         "size": float(np.linalg.norm(high - low)),
         "width": float(high[1] - low[1]),
         "height": float(high[2] + low[2]) / 2,
-        "why": why,
+        "why": by.why,
         "policy": None,
         "numbers": {"home_position": home_position(design).tolist()},
         "bodies": {body.name: int(model.mujoco.body(body.name).id) for body in design.bodies},
@@ -87,7 +118,7 @@ def robot(
     if chosen is not None:
         plain["policy"] = _policy(chosen.policy, Walk(model, chosen))
         plain["numbers"] = body_numbers(model, chosen)
-    return PageRobot(model, chosen, plain)
+    return PageRobot(chosen, plain)
 
 
 def said(design: Design, chosen: Fit | None) -> dict[str, Any]:
@@ -124,22 +155,6 @@ def _room(model: Model) -> tuple[Array, Array]:
     mujoco.mj_kinematics(model.mujoco, data)
     reach = model.mujoco.geom_rbound[:, None]
     return (data.geom_xpos - reach).min(axis=0), (data.geom_xpos + reach).max(axis=0)
-
-
-def _fitting(model: Model, skill: str, policies: Sequence[AnyPolicy]) -> tuple[Fit | None, str]:
-    """The policy of a robot, else None and why it stands."""
-    try:
-        chosen = fit(model, skill, policies)
-    except DraftError as error:
-        return None, error.problems[0].cause
-    why = unknown_terms(chosen.policy)
-    return (None, why) if why else (chosen, "")
-
-
-def unknown_terms(policy: Policy) -> str:
-    """Why a page cannot run a policy; "" if it can."""
-    unknown = [name for name, _ in policy.terms if name not in TERMS]
-    return f"its policy observes {', '.join(unknown)}, which no page computes" if unknown else ""
 
 
 def _policy(policy: Policy, walk: Walk) -> dict[str, Any]:
