@@ -27,6 +27,7 @@ from draft.lazy import on_first_use
 
 if TYPE_CHECKING:
     from draft import extend, metrics, study
+    from draft.browser.page import page
     from draft.design import Design, Finding
     from draft.explore.comparison import compare
     from draft.explore.optimise import optimise
@@ -68,6 +69,7 @@ __all__ = [
     "load",
     "metrics",
     "optimise",
+    "page",
     "play",
     "policy",
     "real_robot",
@@ -96,6 +98,7 @@ _MODULES = {
     "load": "draft.spec",
     "metrics": "",
     "optimise": "draft.explore.optimise",
+    "page": "draft.browser.page",
     "play": "draft.learn.policy.playback",
     "policy": "draft.learn.policy.chosen",
     "real_robot": "draft.validation.compare",

@@ -45,7 +45,7 @@ def webpage(
             '<link rel="icon" href="data:,">',
             f"<title>{escape(title)}</title>",
             f"<style>\n{style}</style>",
-            *([] if modules is None else [f'<script type="importmap">{_imports(modules)}</script>']),
+            "" if modules is None else _imports(modules),
             "</head>\n<body>",
             body,
             *(f"<script{kind}>{script}</script>" for script in scripts),
@@ -55,4 +55,5 @@ def webpage(
 
 
 def _imports(modules: Mapping[str, str]) -> str:
-    return json.dumps({"imports": dict(modules)})
+    """Import map of modules."""
+    return f'<script type="importmap">{json.dumps({"imports": dict(modules)})}</script>'

@@ -102,7 +102,7 @@ def grid(model: Model, vary: Vary, skill: str, policies: Sequence[AnyPolicy]) ->
                 "name": axis.name,
                 "unit": unit_of(design.spec, axis.name),
                 "nodes": at.tolist(),
-                "value": float(np.clip(own.get(axis.name, at.mean()), at[0], at[-1])),
+                "value": float(min(max(own.get(axis.name, float(at.mean())), at[0]), at[-1])),
             }
             for axis, at in zip(axes, nodes, strict=True)
         ],
@@ -307,7 +307,7 @@ def _of_policies(
     differing = np.zeros(len(first), bool)
     for one in found:
         differing |= network_numbers(one.policy) != first
-    networks = np.array([network_numbers(one.policy)[differing] for one in found])
+    networks = np.array([network_numbers(one.policy)[differing] for one in found], float)
     names += [("network", int(i)) for i in np.flatnonzero(differing)]
     return names, np.hstack((values, networks))
 

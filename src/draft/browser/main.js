@@ -216,6 +216,7 @@ class Page {
     if (robot.policy) this.limits.add(robot);
     this.robots.forEach((/** @type {Robot} */ one, /** @type {number} */ i) => { this.speeds[i] += SMOOTH * (one.speed - this.speeds[i]); });
     if ($("follow").checked) this.picture.follow();
+    this.picture.pace(gone);
     this.picture.draw();
     if (this.count.pictures++ % 15 === 0) this.report();
     if ($("load").open) $("busiest").textContent = this.limits.draw(robot) || $("busiest").textContent;

@@ -3,6 +3,8 @@ import * as THREE from "three";
 
 const SKY = 0xe4eaf0, LIGHT = "#d4d9dd", DARK = "#c6ccd2", SHADE = 0xa9b2ba;
 const SUN = new THREE.Vector3(0.35, -0.45, 1);
+const SLOW = 0.045, TRIED = 12; // Time of a picture that is too long [s]; pictures before a change.
+const LEAST = 0.5; // Least resolution, per pixel of the screen.
 const SPHERE = 2, CYLINDER = 5, BOX = 6, MESH = 7; // of mjtGeom
 const UNIT = {
   [SPHERE]: new THREE.SphereGeometry(1, 20, 14),
@@ -90,7 +92,9 @@ export class Picture {
    */
   constructor(place) {
     this.place = place;
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, powerPreference: "low-power" });
+    this.renderer = new THREE.WebGLRenderer({ antialias: !drawnInSoftware(), powerPreference: "low-power" });
+    this.sharpness = Math.min(devicePixelRatio, 2); // Pixels drawn per pixel of the page.
+    this.slow = 0; // Pictures that took too long.
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color(SKY);
     this.camera = new THREE.PerspectiveCamera(38, 1, 0.02, 200);
@@ -143,6 +147,18 @@ export class Picture {
     else this.target.lerp(middle, 0.12);
   }
 
+  /**
+   * Draw coarser pictures where they take too long, as without a graphics card.
+   * @param {number} seconds since the last picture
+   */
+  pace(seconds) {
+    this.slow = seconds > SLOW ? this.slow + 1 : 0;
+    if (this.slow < TRIED || this.sharpness <= LEAST) return;
+    this.slow = 0;
+    this.sharpness = Math.max(LEAST, this.sharpness * 0.75);
+    this.resize();
+  }
+
   /** Draw one picture. */
   draw() {
     this.figures.forEach((one) => one.pose());
@@ -159,7 +175,7 @@ export class Picture {
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.place;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(this.sharpness);
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / Math.max(height, 1);
     this.camera.updateProjectionMatrix();
@@ -182,6 +198,15 @@ export class Picture {
       this.away = Math.min(4, Math.max(0.25, this.away * Math.exp(0.001 * event.deltaY)));
     }, { passive: false });
   }
+}
+
+/** Whether the browser draws without a graphics card, which makes smooth edges slow. */
+function drawnInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl");
+  const known = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = gl && known ? gl.getParameter(known.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
 }
 
 /** A ground of squares of half a metre. */

@@ -28,6 +28,7 @@ COMMANDS = {
     "show": "Show the tree, masses, actuators and findings of a robot.",
     "metrics": "Show what a design can do without learning: torque margins, jump, impact and more.",
     "report": "Write one HTML page about a few designs, which opens offline.",
+    "page": "Write a web page in which robots walk under live physics, for any static host.",
     "view": "Show a robot in MuJoCo's viewer, or in the browser with --web.",
     "studio": "Design a robot in the browser: sliders, masses, trends, findings.",
     "list": "List the shipped robots and their designs.",
