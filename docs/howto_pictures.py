@@ -101,6 +101,17 @@ def _padded(folder: Path, path: Path) -> None:
     row([one.resolve().build() for one in (hopper, Spec.parse(files))], path, SIZE)
 
 
+def _page(folder: Path, path: Path) -> None:
+    """Take a picture of the page in one file, once its robot walks."""
+    from benchmarks import browser
+
+    with browser.browser() as opened:
+        tab = browser.tab(opened, viewport={"width": 1280, "height": 720})
+        tab.goto((folder / "cheetah.html").as_uri() + "#forward=0.8&thigh_length=0.27")
+        tab.wait_for_function("window.draftPage?.count.simulated > 4")
+        tab.screenshot(path=path)
+
+
 PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "quadruped": _robots("courier:courier/search/designs/front_001.yaml"),
     "arm": _robots("arm_dog"),
@@ -116,6 +127,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "explore": _copy("search/front.png"),
     "train": _walk,
     "walk": _studio,
+    "page": _page,
     "ros": _ros,
     "extend": _padded,
 }

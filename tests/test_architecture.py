@@ -55,6 +55,10 @@ BELOW: dict[str, set[str]] = {
     "learn": {"laws", "spec", "design", "model", "metrics", "variation", "serving"},
     "explore": {"laws", "spec", "design", "model", "metrics", "variation", "learn"},
     "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"},
+    "browser": {
+        *("laws", "spec", "design", "model", "metrics", "variation", "explore", "learn"),
+        "reporting",
+    },
     "studio": {
         *("laws", "spec", "design", "model", "metrics", "explore", "learn"),
         *("reporting", "serving"),
@@ -73,6 +77,7 @@ BELOW: dict[str, set[str]] = {
             "variation",
             "explore",
             "reporting",
+            "browser",
             "studio",
             "learn",
             "study",
