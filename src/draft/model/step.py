@@ -62,7 +62,7 @@ def robot_step(model: Model) -> bytes:
         if (motor := _motor(body)) is not None:
             geom, within = motor
             name, place = f"{body.name}{geom.suffix}", _placement(_inside(frame, within))
-            assembly.add(name, place, [(_solid(geom), geom.kind)], geom.mass, geom.volume)
+            assembly.add(name, place, [(_solid(geom), geom.kind)], geom.mass or 0.0, geom.volume)
             shafts[name] = place
         if body.link.pulley is not None:
             geom = body.link.pulley.geom(body.link.tip)
@@ -157,16 +157,18 @@ def _lofted(loft: Loft) -> Any:
     sides = loft.faces()[: 2 * k * (loft.sections - 1)]
     sewing = _make.BRepBuilderAPI_Sewing(_SEWN)
     for corners in (loft.vertices[:k], *loft.vertices[sides], loft.vertices[-k:]):
+        places = corners * _MM
+        # Corners coincide where a plain rectangle is between chamfered ones.
+        places = places[np.linalg.norm(places - np.roll(places, 1, axis=0), axis=1) > _SEWN]
+        if len(places) < 3:
+            continue
         wire = _make.BRepBuilderAPI_MakePolygon()
-        for corner in corners:
-            wire.Add(_gp.gp_Pnt(*(corner * _MM).tolist()))
+        for place in places.tolist():
+            wire.Add(_gp.gp_Pnt(*place))
         wire.Close()
-        face = _make.BRepBuilderAPI_MakeFace(wire.Wire(), True)
-        if face.IsDone():  # Not of a triangle of which two corners coincide.
-            sewing.Add(face.Face())
+        sewing.Add(_make.BRepBuilderAPI_MakeFace(wire.Wire(), True).Face())
     sewing.Perform()
-    volume = 0.0
-    sewed = sewing.SewedShape()
+    volume, sewed = 0.0, sewing.SewedShape()
     if sewed.ShapeType() == _kernel("TopAbs").TopAbs_ShapeEnum.TopAbs_SHELL:
         solid = _make.BRepBuilderAPI_MakeSolid(_topology.TopoDS.Shell(sewed)).Solid()
         _kernel("BRepLib").BRepLib.OrientClosedSolid_s(solid)
@@ -175,11 +177,12 @@ def _lofted(loft: Loft) -> Any:
         properties = _kernel("GProp").GProp_GProps()
         _kernel("BRepGProp").BRepGProp.VolumeProperties_s(merged.Shape(), properties)
         volume = properties.Mass() / _MM**3
-        if abs(volume - loft.volume) <= _SAME * loft.volume:
+        valid = _kernel("BRepCheck").BRepCheck_Analyzer(merged.Shape()).IsValid()
+        if valid and abs(volume - loft.volume) <= _SAME * loft.volume:
             return merged.Shape()
     raise ModelError(
-        f"the trunk is a solid of {volume:.9g} m3 in the CAD kernel and of {loft.volume:.9g} m3 in "
-        "the design",
+        f"the trunk of {loft.volume:.9g} m3 is no solid for the CAD kernel, which finds "
+        f"{volume:.9g} m3",
         "correct the sections in root.yaml: none may touch itself",
     )
 
