@@ -56,8 +56,10 @@ def robot_step(model: Model) -> bytes:
     """
     design = model.design
     assembly = _Assembly(f"{design.name}_{design.label}")
+    floor: Vector = (0.0, 0.0, design.lowest(home=True) if design.floating else 0.0)
     joints, shafts = {}, {}
-    for body, frame in zip(design.bodies, _frames(design), strict=True):
+    for body, own in zip(design.bodies, design.frames(home=True), strict=True):
+        frame = _inside((floor, None), own)
         _add_link(assembly, design, body, frame)
         if (motor := _motor(body)) is not None:
             geom, within = motor
@@ -75,15 +77,6 @@ def robot_step(model: Model) -> bytes:
     assembly.add_axes("joint_axes", joints, length)
     assembly.add_axes("motor_axes", shafts, length)
     return assembly.written(design.reference)
-
-
-def _frames(design: Design) -> list[Frame]:
-    """Frames of the bodies in the world, in the home pose."""
-    frames = design.frames(home=True)
-    if not design.floating:
-        return frames
-    up: Vector = (0.0, 0.0, design.lowest(home=True))
-    return [(g.add(up, origin), rotation) for origin, rotation in frames]
 
 
 def _inside(outer: Frame, inner: Frame) -> Frame:
