@@ -50,7 +50,7 @@ def motors(models: dict[str, Model], path: Path) -> None:
         models: robots with one class of actuators, by what is known of it.
         path: PNG to write.
     """
-    _save(path, partial(_motors, models))
+    save(path, partial(_motors, models))
 
 
 def _motors(models: dict[str, Model]) -> Figure:
@@ -104,7 +104,7 @@ def exported(folder: Path, path: Path) -> None:
         folder: folder of `draft export`.
         path: PNG to write.
     """
-    _save(path, partial(_exported, folder))
+    save(path, partial(_exported, folder))
 
 
 def _exported(folder: Path) -> Figure:
@@ -167,5 +167,6 @@ def _show(ax: Any, pixels: Pixels) -> None:
     ax.set_axis_off()
 
 
-def _save(path: Path, make: Any) -> None:
+def save(path: Path, make: Any) -> None:
+    """Write a figure as PNG."""
     plotting.save(path.parent, {path.stem: make}, DPI, ("png",))

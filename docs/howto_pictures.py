@@ -21,7 +21,7 @@ from draft.offscreen import prefer_offscreen
 
 prefer_offscreen()  # before MuJoCo is imported
 
-from docs import blocks, howto_figures  # noqa: E402
+from docs import blocks, cad_figure, howto_figures  # noqa: E402
 from docs.pictures import IMAGES, row, shrink  # noqa: E402
 from draft.design.references import open_design  # noqa: E402
 from draft.spec import Spec, load  # noqa: E402
@@ -89,6 +89,11 @@ def _ros(folder: Path, path: Path) -> None:
     howto_figures.exported(folder / "bear_ros", path)
 
 
+def _machine(folder: Path, path: Path) -> None:
+    """Draw what a CAD kernel reads from the page's export, and its bill of materials."""
+    cad_figure.assembly(folder / "machine", path)
+
+
 def _padded(folder: Path, path: Path) -> None:
     """Draw the hopper on its ball, and on the pad of the example of an extension."""
     sys.path.insert(0, str(folder / "examples" / "extension"))
@@ -129,6 +134,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "walk": _studio,
     "page": _page,
     "ros": _ros,
+    "to-a-machine": _machine,
     "extend": _padded,
 }
 

@@ -35,6 +35,7 @@ NEEDS = {
         "`optimise`": SEARCH,
     },
     "mcp": {"`mcp`": "mcp ."},
+    "cad": {"`export --format step`": "export bear --out e --format step"},
     "cluster": {"`study --ray`": "study examples/three_quadrupeds.yaml --toy --ray"},
     "robots": {"`import` of robots by name": "import menagerie:unitree_go2 --out i"},
     "learn": {

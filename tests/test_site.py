@@ -43,6 +43,7 @@ NEEDS = {
     "howto/payload": ("report",),
     "howto/quadruped": ("explore",),
     "howto/ros": (),
+    "howto/to-a-machine": ("cad",),
     "howto/train": (),
     "howto/wheeled": ("explore",),
     "howto/walk": ("report",),

@@ -37,7 +37,9 @@ def opened(browser: Any) -> Iterator[Callable[[Path, str], Any]]:
         tab.asked = []
         tab.on("request", lambda request: tab.asked.append(request.url))
         tab.goto(f"http://127.0.0.1:{server.server_port}/index.html{link}")
-        tab.wait_for_function("window.draftPage || /cannot/.test(document.getElementById('note').textContent)")
+        tab.wait_for_function(
+            "window.draftPage || /cannot/.test(document.getElementById('note').textContent)"
+        )
         return tab
 
     yield open_

@@ -110,7 +110,7 @@ def _check(designs: Sequence[Design], varied: bool) -> None:
 def _check_folder(folder: Path) -> None:
     """Refuse to replace what is not a page written by Draft."""
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise DraftError(f"'{folder}' exists and is not a folder", f"{_REMEDY}, or add --single")
+        raise DraftError(f"'{folder}' exists and is not a folder", f"{_REMEDY}, or give `single`")
     if folder.is_dir() and any(folder.iterdir()) and not (folder / _MARK).is_file():
         cause = f"'{folder}' is not a page that Draft wrote: it has no {_MARK}; it is kept"
         raise DraftError(cause, f"{_REMEDY}, or empty the folder")
@@ -164,7 +164,7 @@ def _contents(
 # Browsers load no modules from the disk.
 _SERVED = """if (location.protocol === "file:") document.getElementById("note").textContent =
   "Browsers run a page of several files only from a server: python -m http.server in its folder, \
-or write it with --single.";
+or write it as one file.";
 else import("draft/main");"""
 
 

@@ -45,13 +45,13 @@ def main(
         tyro.conf.arg(
             name="format",
             metavar=f"{{{','.join(EXPORTERS)}}} ...",
-            help="urdf with its mesh and actuators.json, glb, mjcf.",
+            help="urdf with its mesh and actuators.json, glb, mjcf, step with bom.csv.",
             help_behavior_hint=f"(default: {' '.join(FORMATS)})",
         ),
     ] = FORMATS,
     json: JsonOutput = False,
 ) -> int:
-    """Write a robot as URDF with an actuator table, as glTF for viewers, and as MJCF."""
+    """Write a robot as URDF with an actuator table, as glTF for viewers, as MJCF, and for CAD."""
     check_folder(out)
     resolved, clock = open_design(reference, design, values)
     folder = None

@@ -105,6 +105,10 @@ class Body(NamedTuple):
         """Solids that occupy space: actuator, member and end."""
         if (motor := self.motor_geom) is not None:
             yield motor
+        yield from self.link_solids()
+
+    def link_solids(self) -> Iterator[Geom]:
+        """Solids of the link itself: member and end."""
         if (member := self.link.member) is not None:
             yield member.geom(self.link.tip, self.member_radius, self.member_mass)
         if (end := self.end_geom) is not None:

@@ -169,6 +169,25 @@ def find(name: str, more: tuple[Part, ...] = ()) -> Part:
     return parts[name]
 
 
+def nearest(peak_torque: float, no_load_speed: float, parts: Iterable[Part]) -> Part:
+    """Find the module nearest to a peak torque and a no-load speed, both compared as ratios.
+
+        >>> nearest(20.0, 45.0, catalogue().values()).name
+        'AK80-9 V3'
+
+    Args:
+        peak_torque: at the output [N m].
+        no_load_speed: at the output [rad/s].
+        parts: the modules, at least one; of equally near ones the first is taken.
+    """
+
+    def distance(part: Part) -> float:
+        ratios = part.peak_torque / peak_torque, part.no_load_speed / no_load_speed
+        return math.hypot(*map(math.log, ratios))
+
+    return min(parts, key=distance)
+
+
 @lru_cache(maxsize=8)
 def extremes(
     more: tuple[Part, ...] = (), kind: str = MODULE

@@ -11,7 +11,7 @@ from draft.model.model import Model
 
 
 def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = FORMATS) -> Path:
-    """Write a robot as URDF with an actuator table, as glTF and as MJCF.
+    """Write a robot as URDF with an actuator table, as glTF and as MJCF, or for CAD.
 
         >>> folder = draft.export(draft.load("quadruped").resolve("bear"), "bear")
         >>> sorted(path.name for path in folder.iterdir())[:4]
@@ -23,17 +23,19 @@ def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = 
         design: a single design, or its model if that is built already.
         folder: folder to write, atomically; files that Draft wrote there before are replaced.
         formats: "urdf" (robot.urdf, meshes/trunk.stl and actuators.json with what URDF cannot
-            hold: armature [kg m2], gains [N m/rad, N m s/rad]), "glb" (robot.glb, lengths in m)
-            and "mjcf" (robot.xml, scene.xml), and those of extensions.
+            hold: armature [kg m2], gains [N m/rad, N m s/rad]), "glb" (robot.glb, lengths in m),
+            "mjcf" (robot.xml, scene.xml), "step" (robot.step in mm and bom.csv; extra `cad`),
+            and those of extensions.
 
     Returns:
         The folder.
 
     Raises:
         RefusedError: the design filter found errors.
-        ModelError: MuJoCo does not accept the model.
+        ModelError: MuJoCo does not accept the model, or the CAD kernel the trunk.
         DraftError: the design is N designs, a format is unknown, the folder holds files that Draft
-            did not write, or cannot be written, or an exporter of an extension fails.
+            did not write, or cannot be written, an extra is missing, or an exporter of an extension
+            fails.
     """
     model = design.build() if isinstance(design, Design) else design
     return model.save(folder, formats)

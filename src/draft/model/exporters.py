@@ -142,3 +142,12 @@ def mjcf(model: Model) -> dict[str, str | bytes]:
     """MJCF of the robot, and a scene with floor, light and servos."""
     model.scene()
     return {"robot.xml": model.xml, "scene.xml": model.scene_xml}
+
+
+@exporter("robot.step", "bom.csv")
+def step(model: Model) -> dict[str, str | bytes]:
+    """STEP assembly for CAD, and a bill of materials; needs the extra `cad`."""
+    from draft.model.bom import bom_csv
+    from draft.model.step import robot_step
+
+    return {"robot.step": robot_step(model), "bom.csv": bom_csv(model.design)}

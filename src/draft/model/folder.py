@@ -42,7 +42,8 @@ def save(
         folder: folder to write. Everything that Draft wrote there before is removed, so that all
             files are of one design.
         formats: names of `EXPORTERS`: "mjcf" is robot.xml and scene.xml; "urdf" is robot.urdf,
-            meshes/trunk.stl and actuators.json; "glb" is robot.glb.
+            meshes/trunk.stl and actuators.json; "glb" is robot.glb; "step" is robot.step and
+            bom.csv.
         more: text of further files by name, all of them known.
 
     Returns:
@@ -50,8 +51,8 @@ def save(
 
     Raises:
         DraftError: a format is unknown, the folder holds files that Draft did not write, it
-            cannot be written, or an exporter of an extension fails.
-        ModelError: MuJoCo does not accept the scene.
+            cannot be written, an extra is missing, or an exporter of an extension fails.
+        ModelError: MuJoCo does not accept the scene, or the CAD kernel the trunk.
     """
     check_formats(formats)
     try:
