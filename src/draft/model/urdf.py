@@ -26,6 +26,7 @@ from draft.values import Array, scalar
 if TYPE_CHECKING:
     from draft.model.model import Model
 
+DECLARATION = '<?xml version="1.0"?>\n'
 TRUNK = "meshes/trunk.stl"
 # URDF requires a velocity limit, also for a joint without an actuator [rad/s or m/s].
 _NO_LIMIT = 1000.0
@@ -46,6 +47,11 @@ _CORNERED = (
 
 def robot_urdf(model: Model) -> str:
     """URDF text of the robot; it refers to the mesh `meshes/trunk.stl` in the same folder."""
+    return DECLARATION + robot_element(model, TRUNK).text()
+
+
+def robot_element(model: Model, mesh: str) -> Element:
+    """URDF of the robot as elements; `mesh` is the file of the trunk's mesh as URDF names it."""
     root = Element("robot", name=model.design.name)
     root.add("mujoco").add(
         "compiler",
@@ -60,10 +66,11 @@ def robot_urdf(model: Model) -> str:
         root.add("link", name="world")
     drawn = shapes(model.mujoco, model.design)
     for i, body in enumerate(model.design.bodies):
-        _link(root, model.mujoco, i + 1, [shape for shape in drawn if shape.body == i + 1])
+        own = [shape for shape in drawn if shape.body == i + 1]
+        _link(root, model.mujoco, i + 1, own, mesh)
         if body.parent is not None or not model.design.floating:
             _joint(root, model, body, i + 1)
-    return '<?xml version="1.0"?>\n' + root.text()
+    return root
 
 
 def actuators(design: Design) -> dict[str, Any]:
@@ -106,6 +113,11 @@ def actuators(design: Design) -> dict[str, Any]:
     }
 
 
+def meshes(design: Design) -> dict[str, bytes]:
+    """Bytes of the mesh of the trunk by its path; a fixed base has none."""
+    return {} if design.lofted is None else {TRUNK: trunk_stl(design.lofted.loft)}
+
+
 def trunk_stl(loft: Loft) -> bytes:
     """Bytes of a binary STL file of the trunk in its own frame [m]."""
     corners = loft.vertices[loft.faces()]
@@ -129,32 +141,36 @@ def rpy(rotation: Array) -> tuple[float, float, float]:
     return roll, pitch, math.atan2(rotation[1, 0], rotation[0, 0])
 
 
-def _link(root: Element, model: mujoco.MjModel, i: int, drawn: list[Shape]) -> None:
+def tensor(model: mujoco.MjModel, i: int) -> dict[str, float]:
+    """Inertia of a body about its centre of mass in the axes of its link [kg m2], as URDF says."""
+    axes = matrix(model.body_iquat[i])
+    full = axes @ np.diag(model.body_inertia[i]) @ axes.T
+    indices = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
+    return {f"i{name}": float(full[at]) for name, at in indices.items()}
+
+
+def _link(root: Element, model: mujoco.MjModel, i: int, drawn: list[Shape], mesh: str) -> None:
     link = root.add("link", name=model.body(i).name)
     mass = float(model.body_mass[i])
     if mass > 0:
-        axes = matrix(model.body_iquat[i])
-        tensor = axes @ np.diag(model.body_inertia[i]) @ axes.T
         inertial = link.add("inertial")
         inertial.add("origin", xyz=model.body_ipos[i], rpy=(0, 0, 0))
         inertial.add("mass", value=mass)
-        indices = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2)}
-        indices |= {"yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
-        inertial.add("inertia", **{f"i{name}": float(tensor[at]) for name, at in indices.items()})
+        inertial.add("inertia", **tensor(model, i))
     for shape in drawn:
-        visual = _shape(link, "visual", shape, shape.name)
+        visual = _shape(link, "visual", shape, shape.name, mesh)
         visual.add("material", name=shape.kind)
         if shape.collides:
-            _shape(link, "collision", shape, f"{shape.name}_collision")
+            _shape(link, "collision", shape, f"{shape.name}_collision", mesh)
 
 
-def _shape(link: Element, use: str, shape: Shape, name: str) -> Element:
+def _shape(link: Element, use: str, shape: Shape, name: str, mesh: str) -> Element:
     element = link.add(use, name=name)
     element.add("origin", xyz=shape.position, rpy=rpy(shape.rotation))
     geometry = element.add("geometry")
     size = shape.size
     if shape.form == "mesh":
-        geometry.add("mesh", filename=TRUNK)
+        geometry.add("mesh", filename=mesh)
     elif shape.form == "box":
         geometry.add("box", size=2 * size)
     elif shape.form == "sphere":
@@ -168,7 +184,7 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
     compiled, design, joint = model.mujoco, model.design, body.joint
     parent = compiled.body(compiled.body_parentid[i]).name
     kind = "fixed" if joint is None else joint.kind
-    name = _fixed_name(design, body) if joint is None else body.prefix + joint.name
+    name = joint_name(design, body)
     element = root.add("joint", name=name, type=kind)
     element.add("origin", xyz=compiled.body_pos[i], rpy=rpy(matrix(compiled.body_quat[i])))
     element.add("parent", link=parent)
@@ -192,8 +208,10 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
         element.add("dynamics", damping=scalar(a.damping), friction=scalar(a.friction_loss))
 
 
-def _fixed_name(design: Design, body: Body) -> str:
-    """Name of a fixed joint, different from that of every moving joint."""
+def joint_name(design: Design, body: Body) -> str:
+    """Name of the joint of a body; a fixed one has a name different from every moving joint's."""
+    if body.joint is not None:
+        return body.prefix + body.joint.name
     name = f"{body.name}_weld"
     while name in design.joints:
         name += "_"
