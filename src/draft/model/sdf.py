@@ -16,7 +16,7 @@ import mujoco
 from draft.design.design import Body, Design
 from draft.model.mjcf import colors
 from draft.model.shapes import Shape, matrix, shapes
-from draft.model.urdf import DECLARATION, TRUNK, rpy, tensor
+from draft.model.urdf import DECLARATION, LEAST_MASS, TRUNK, rpy, tensor
 from draft.model.urdf import joint_name as name_in_urdf
 from draft.model.xml import Element
 from draft.spec.primitives.base import Color
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from draft.model.model import Model
 
 VERSION = "1.11"  # The first with `mimic`.
-# Of a link without mass, which SDFormat does not have [kg], [kg m2].
-_MASS, _INERTIA = 1e-9, 1e-12
 
 
 def robot_sdf(model: Model) -> str:
@@ -79,10 +77,10 @@ def _link(
     mass = float(compiled.body_mass[i])
     inertial = link.add("inertial")
     inertial.put("pose", (*compiled.body_ipos[i], 0, 0, 0))
-    inertial.put("mass", mass or _MASS)
+    inertial.put("mass", mass or LEAST_MASS)  # SDFormat has no link without mass.
     inertia = inertial.add("inertia")
     for name, value in tensor(compiled, i).items():
-        inertia.put(name, value if mass else _INERTIA * (name[1] == name[2]))
+        inertia.put(name, value)
     for shape in drawn:
         visual = _shape(link, "visual", shape, shape.name)
         material = visual.add("material")

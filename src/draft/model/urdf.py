@@ -31,6 +31,8 @@ TRUNK = "meshes/trunk.stl"
 # URDF requires a velocity limit, also for a joint without an actuator [rad/s or m/s].
 _NO_LIMIT = 1000.0
 _GIMBAL = 1e-9
+# Of a link without mass, where a format has none [kg], [kg m2].
+LEAST_MASS, LEAST_INERTIA = 1e-9, 1e-12
 # Quantities of a module that its joint has under another name, or does not show.
 _OF_MODULE = (
     *("aspect_ratio", "mass", "volume", "radius", "length", "width", "height"),
@@ -47,12 +49,7 @@ _CORNERED = (
 
 def robot_urdf(model: Model) -> str:
     """URDF text of the robot; it refers to the mesh `meshes/trunk.stl` in the same folder."""
-    return DECLARATION + robot_element(model, TRUNK).text()
-
-
-def robot_element(model: Model, mesh: str) -> Element:
-    """URDF of the robot as elements; `mesh` is the file of the trunk's mesh as URDF names it."""
-    root = Element("robot", name=model.design.name)
+    root = robot_element(model, TRUNK)
     root.add("mujoco").add(
         "compiler",
         strippath="false",
@@ -60,6 +57,18 @@ def robot_element(model: Model, mesh: str) -> Element:
         discardvisual="false",
         inertiafromgeom="false",
     )
+    return DECLARATION + root.text()
+
+
+def robot_element(model: Model, mesh: str, least: bool = False) -> Element:
+    """URDF of the robot as elements.
+
+    Args:
+        model: the model.
+        mesh: file of the trunk's mesh as URDF names it.
+        least: whether a body without mass has the least one, as Gazebo needs; else it has none.
+    """
+    root = Element("robot", name=model.design.name)
     for name, color in colors(model.design).items():
         root.add("material", name=name).add("color", rgba=color)
     if not model.design.floating:
@@ -67,7 +76,7 @@ def robot_element(model: Model, mesh: str) -> Element:
     drawn = shapes(model.mujoco, model.design)
     for i, body in enumerate(model.design.bodies):
         own = [shape for shape in drawn if shape.body == i + 1]
-        _link(root, model.mujoco, i + 1, own, mesh)
+        _link(root, model.mujoco, i + 1, own, mesh, least)
         if body.parent is not None or not model.design.floating:
             _joint(root, model, body, i + 1)
     return root
@@ -142,16 +151,25 @@ def rpy(rotation: Array) -> tuple[float, float, float]:
 
 
 def tensor(model: mujoco.MjModel, i: int) -> dict[str, float]:
-    """Inertia of a body about its centre of mass in the axes of its link [kg m2], as URDF says."""
+    """Inertia of a body about its centre of mass in the axes of its link [kg m2], as URDF says.
+
+    That of a body without mass is the least one.
+    """
+    if not model.body_mass[i]:
+        return {
+            f"i{a}{b}": LEAST_INERTIA * (a == b) for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")
+        }
     axes = matrix(model.body_iquat[i])
     full = axes @ np.diag(model.body_inertia[i]) @ axes.T
     indices = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
     return {f"i{name}": float(full[at]) for name, at in indices.items()}
 
 
-def _link(root: Element, model: mujoco.MjModel, i: int, drawn: list[Shape], mesh: str) -> None:
+def _link(
+    root: Element, model: mujoco.MjModel, i: int, drawn: list[Shape], mesh: str, least: bool
+) -> None:
     link = root.add("link", name=model.body(i).name)
-    mass = float(model.body_mass[i])
+    mass = float(model.body_mass[i]) or (LEAST_MASS if least else 0.0)
     if mass > 0:
         inertial = link.add("inertial")
         inertial.add("origin", xyz=model.body_ipos[i], rpy=(0, 0, 0))
