@@ -13,11 +13,18 @@ from typing import TYPE_CHECKING
 
 import mujoco
 
-from draft.design.design import Body, Design
+from draft.design.design import Body
 from draft.model.mjcf import colors
 from draft.model.shapes import Shape, matrix, shapes
-from draft.model.urdf import DECLARATION, LEAST_MASS, TRUNK, rpy, tensor
-from draft.model.urdf import joint_name as name_in_urdf
+from draft.model.urdf import (
+    DECLARATION,
+    LEAST_MASS,
+    TRUNK,
+    distinct_name,
+    joint_name,
+    rpy,
+    tensor,
+)
 from draft.model.xml import Element
 from draft.spec.primitives.base import Color
 from draft.values import scalar
@@ -40,17 +47,10 @@ def robot_sdf(model: Model) -> str:
             robot.put("pose", (*compiled.body_pos[1], *rpy(matrix(compiled.body_quat[1]))))
             _link(robot, compiled, i + 1, own, None, paint)
         else:
-            joint = sdf_name(design, name_in_urdf(design, body))
+            joint = distinct_name(design, joint_name(design, body))
             _link(robot, compiled, i + 1, own, joint, paint)
             _joint(robot, model, body, i + 1)
     return DECLARATION + root.text()
-
-
-def sdf_name(design: Design, joint: str) -> str:
-    """Name in SDFormat of a joint of the URDF, which differs from that of every link."""
-    while any(joint == body.name for body in design.bodies):
-        joint += "_joint"
-    return joint
 
 
 def model_config(model: Model) -> str:
@@ -107,9 +107,9 @@ def _shape(link: Element, use: str, shape: Shape, name: str) -> Element:
 
 def _joint(robot: Element, model: Model, body: Body, i: int) -> None:
     compiled, design, joint = model.mujoco, model.design, body.joint
-    name, parent = name_in_urdf(design, body), compiled.body_parentid[i]
+    name, parent = joint_name(design, body), compiled.body_parentid[i]
     kind = "fixed" if joint is None else joint.kind
-    element = robot.add("joint", name=sdf_name(design, name), type=kind)
+    element = robot.add("joint", name=distinct_name(design, name), type=kind)
     pose = (*compiled.body_pos[i], *rpy(matrix(compiled.body_quat[i])))
     above = compiled.body(parent).name if parent else None
     element.put("pose", pose, relative_to=above or "__model__")
@@ -133,7 +133,7 @@ def _joint(robot: Element, model: Model, body: Body, i: int) -> None:
         element.put("drake:rotor_inertia", float(hinge.armature[0]))
         element.put("drake:gear_ratio", 1.0)
     if (follows := joint.follows) is not None:
-        leader = sdf_name(design, follows.joint)
+        leader = distinct_name(design, follows.joint)
         ratio, offset = scalar(follows.ratio), scalar(follows.offset)
         mimic = axis.add("mimic", joint=leader)
         mimic.put("multiplier", ratio)

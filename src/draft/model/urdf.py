@@ -31,8 +31,8 @@ TRUNK = "meshes/trunk.stl"
 # URDF requires a velocity limit, also for a joint without an actuator [rad/s or m/s].
 _NO_LIMIT = 1000.0
 _GIMBAL = 1e-9
-# Of a link without mass, where a format has none [kg], [kg m2].
-LEAST_MASS, LEAST_INERTIA = 1e-9, 1e-12
+# Of a link without mass, where a format has none [kg], [kg m2]; Gazebo takes 1e-6 kg for none.
+LEAST_MASS, LEAST_INERTIA = 1e-5, 1e-8
 # Quantities of a module that its joint has under another name, or does not show.
 _OF_MODULE = (
     *("aspect_ratio", "mass", "volume", "radius", "length", "width", "height"),
@@ -60,13 +60,14 @@ def robot_urdf(model: Model) -> str:
     return DECLARATION + root.text()
 
 
-def robot_element(model: Model, mesh: str, least: bool = False) -> Element:
+def robot_element(model: Model, mesh: str, gazebo: bool = False) -> Element:
     """URDF of the robot as elements.
 
     Args:
         model: the model.
         mesh: file of the trunk's mesh as URDF names it.
-        least: whether a body without mass has the least one, as Gazebo needs; else it has none.
+        gazebo: whether it is for Gazebo, which needs a mass of every link, and names of joints that
+            differ from those of links.
     """
     root = Element("robot", name=model.design.name)
     for name, color in colors(model.design).items():
@@ -76,9 +77,9 @@ def robot_element(model: Model, mesh: str, least: bool = False) -> Element:
     drawn = shapes(model.mujoco, model.design)
     for i, body in enumerate(model.design.bodies):
         own = [shape for shape in drawn if shape.body == i + 1]
-        _link(root, model.mujoco, i + 1, own, mesh, least)
+        _link(root, model.mujoco, i + 1, own, mesh, gazebo)
         if body.parent is not None or not model.design.floating:
-            _joint(root, model, body, i + 1)
+            _joint(root, model, body, i + 1, gazebo)
     return root
 
 
@@ -198,12 +199,12 @@ def _shape(link: Element, use: str, shape: Shape, name: str, mesh: str) -> Eleme
     return element
 
 
-def _joint(root: Element, model: Model, body: Body, i: int) -> None:
+def _joint(root: Element, model: Model, body: Body, i: int, gazebo: bool) -> None:
     compiled, design, joint = model.mujoco, model.design, body.joint
     parent = compiled.body(compiled.body_parentid[i]).name
     kind = "fixed" if joint is None else joint.kind
     name = joint_name(design, body)
-    element = root.add("joint", name=name, type=kind)
+    element = root.add("joint", name=distinct_name(design, name) if gazebo else name, type=kind)
     element.add("origin", xyz=compiled.body_pos[i], rpy=rpy(matrix(compiled.body_quat[i])))
     element.add("parent", link=parent)
     element.add("child", link=body.name)
@@ -221,9 +222,17 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
     )
     if (follows := joint.follows) is not None:
         multiplier, offset = scalar(follows.ratio), scalar(follows.offset)
-        element.add("mimic", joint=follows.joint, multiplier=multiplier, offset=offset)
+        leader = distinct_name(design, follows.joint) if gazebo else follows.joint
+        element.add("mimic", joint=leader, multiplier=multiplier, offset=offset)
     if a:
         element.add("dynamics", damping=scalar(a.damping), friction=scalar(a.friction_loss))
+
+
+def distinct_name(design: Design, joint: str) -> str:
+    """Name for a joint that differs from that of every link, as SDFormat needs."""
+    while any(joint == body.name for body in design.bodies):
+        joint += "_joint"
+    return joint
 
 
 def joint_name(design: Design, body: Body) -> str:

@@ -3,16 +3,19 @@
 Every driven joint takes a torque up to the peak of its motor, and every joint reports position and
 velocity. A joint that follows another has no command: its `mimic` is in the URDF. The inertial
 sensor is at the site `imu`; each foot has a contact sensor on the shape that meets the floor.
+Gazebo makes SDFormat of the URDF, where joints and links share their names.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from draft.design.design import Design
+from draft.design.parts import Joint
 from draft.model.model import Model
 from draft.model.scene import TIMESTEP
 from draft.model.shapes import shapes
-from draft.model.urdf import joint_name
+from draft.model.urdf import distinct_name, joint_name
 from draft.model.xml import Element
 from draft.values import scalar
 
@@ -26,11 +29,16 @@ RATE = round(1 / TIMESTEP)  # Of controllers and sensors [1/s].
 _XYZ = ("x", "y", "z")
 
 
+def joints(design: Design) -> dict[str, Joint]:
+    """Joints by their name in the package, which differs from that of every link."""
+    return {distinct_name(design, name): joint for name, joint in design.joints.items()}
+
+
 def add_control(root: Element, model: Model) -> None:
     """Add the block of ros2_control, whose hardware is an argument of xacro."""
     block = root.add("ros2_control", name=model.design.name, type="system")
     block.add("hardware").put("plugin", "$(arg hardware)")
-    for name, joint in model.design.joints.items():
+    for name, joint in joints(model.design).items():
         element = block.add("joint", name=name)
         if (drive := model.design.drive(joint)) is not None:
             command, peak = element.add("command_interface", name="effort"), drive.peak_torque
@@ -67,7 +75,8 @@ def add_gazebo(root: Element, model: Model, frames: dict[str, str]) -> None:
     for body in model.design.bodies:
         if body.joint is None and body.parent is not None:
             # Else Gazebo makes one link of the two.
-            welded = root.add("gazebo", reference=joint_name(model.design, body))
+            weld = distinct_name(model.design, joint_name(model.design, body))
+            welded = root.add("gazebo", reference=weld)
             welded.put("preserveFixedJoint", "true")
     if has_imu(model):
         sensor = root.add("gazebo", reference=frames[IMU]).add("sensor", name=IMU, type="imu")
@@ -110,7 +119,7 @@ def controllers(model: Model, frames: dict[str, str]) -> dict[str, Any]:
     design = model.design
     kinds = {BROADCASTER: "joint_state_broadcaster/JointStateBroadcaster"}
     own: dict[str, Any] = {}
-    if driven := [name for name, joint in design.joints.items() if design.drive(joint)]:
+    if driven := [name for name, joint in joints(design).items() if design.drive(joint)]:
         kinds[EFFORTS] = "forward_command_controller/ForwardCommandController"
         own[EFFORTS] = {"joints": driven, "interface_name": "effort"}
     if has_imu(model):

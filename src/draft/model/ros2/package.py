@@ -90,7 +90,7 @@ def package_name(design: Design) -> str:
 def package_files(model: Model) -> dict[str, str | bytes]:
     """Contents of the files, by path in the package."""
     design, name = model.design, package_name(model.design)
-    robot = robot_element(model, f"package://{name}/{TRUNK}", least=True)
+    robot = robot_element(model, f"package://{name}/{TRUNK}", gazebo=True)
     frames = _add_frames(robot, model)
     parameters = control.controllers(model, frames)
     kinds = parameters["controller_manager"]["ros__parameters"]
@@ -103,7 +103,7 @@ def package_files(model: Model) -> dict[str, str | bytes]:
         "INACTIVE_CONTROLLERS": repr(efforts),
         "ACTIVE_CONTROLLERS": repr([key for key in loaded if key not in efforts]),
     }
-    zeros = {key: scalar(joint.home) for key, joint in design.joints.items()}
+    zeros = {key: scalar(joint.home) for key, joint in control.joints(design).items()}
     home = {"/**": {"ros__parameters": {"zeros": zeros}}}
     files: dict[str, str | bytes] = {
         "LICENSE": f"{_LICENSE}\n\nChoose one: put its text here, and its name in package.xml.\n",
