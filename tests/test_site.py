@@ -42,6 +42,7 @@ NEEDS = {
     "howto/payload": ("report",),
     "howto/quadruped": ("explore",),
     "howto/ros": (),
+    "howto/to-a-machine": (),
     "howto/train": (),
     "howto/wheeled": ("explore",),
     "howto/walk": ("report",),
