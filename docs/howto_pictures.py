@@ -117,6 +117,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "train": _walk,
     "walk": _studio,
     "ros": _ros,
+    "to-a-machine": _robots("bear"),
     "extend": _padded,
 }
 
