@@ -96,7 +96,7 @@ class Model:
 
         Args:
             folder: folder to write.
-            formats: formats to write: "mjcf", "urdf", "glb", or those of extensions.
+            formats: formats to write: "mjcf", "urdf", "sdf", "glb", or those of extensions.
             more: text of further files by name, such as report.html.
 
         Returns:
