@@ -413,6 +413,12 @@ WORDS = {
         lambda robot: (robot / LONG).rename(robot / "designs/a b.yaml"), False
     ),
     # the command line
+    "ros2_package_beside_formats": Mistake(
+        placed=False, command=("export", "robot", "--ros2", "package", "--format", "glb")
+    ),
+    "ros2_package_without_a_folder": Mistake(
+        placed=False, command=("export", "robot", "--ros2", "")
+    ),
     "unknown_robot": Mistake(placed=False, command=("build", "quadropod")),
     "robot_without_a_name": Mistake(placed=False, command=("check", "")),
     "robot_with_a_long_name": Mistake(placed=False, command=("check", "a" * 300)),

@@ -15,18 +15,19 @@ import draft
 SOURCE = Path(draft.__file__).parent
 # Lines of Python; "." for the files beside the packages.
 BUDGET = {
-    ".": 2_440,
+    ".": 2_460,
     "assistant": 620,
-    "cli": 5_840,
+    "browser": 810,
+    "cli": 5_920,  # `--ros2` of export.
     "description": 2_330,
     "design": 6_450,
     "explore": 4_730,
     "fitting": 3_890,
     "imports": 6_560,
     "laws": 2_090,  # The nearest module of the catalogue.
-    "learn": 20_160,
+    "learn": 20_220,
     "metrics": 3_200,
-    "model": 4_530,  # STEP, and the bill of materials beside it.
+    "model": 5_160,  # STEP, a bill of materials, SDFormat, and the package for ROS 2.
     "reporting": 1_820,
     "serving": 560,
     "spec": 5_170,

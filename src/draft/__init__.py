@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from draft.learn.policy.playback import play
     from draft.learn.training.train import train
     from draft.model import Model
-    from draft.model.export import export
+    from draft.model.export import export, export_ros2
     from draft.reporting.report import report
     from draft.spec import Spec, load, shipped
     from draft.twins.compare import compare_twin
@@ -64,6 +64,7 @@ __all__ = [
     "compare_twin",
     "evaluate",
     "export",
+    "export_ros2",
     "extend",
     "import_robot",
     "load",
@@ -93,6 +94,7 @@ _MODULES = {
     "compare_twin": "draft.twins.compare",
     "evaluate": "draft.learn.measuring.evaluation",
     "export": "draft.model.export",
+    "export_ros2": "draft.model.export",
     "extend": "",
     "import_robot": "draft.imports.importer",
     "load": "draft.spec",

@@ -40,7 +40,7 @@ def test_help_shows_real_defaults_and_completion_knows_the_options(
     options = OPTIONS[" ".join(path)]
     stated = re.findall(r"\((?:default: [^)]+|required[^)]*)\)", told)
     assert len(stated) >= len(options)
-    listed = set(re.findall(r"^ +(?:-h, )?(--[a-z][a-z-]*)", said, re.MULTILINE))
+    listed = set(re.findall(r"^ +(?:-h, )?(--[a-z][a-z0-9-]*)", said, re.MULTILINE))
     assert {*options, "--help"} == (listed or {"--help"})
 
 

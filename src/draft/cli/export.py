@@ -18,6 +18,7 @@ from draft.cli.options import (
     check_folder,
     open_design,
 )
+from draft.errors import DraftError
 from draft.model.exporters import EXPORTERS, FORMATS
 
 # Those of extensions too: this module is imported for its command alone.
@@ -45,22 +46,38 @@ def main(
         tyro.conf.arg(
             name="format",
             metavar=f"{{{','.join(EXPORTERS)}}} ...",
-            help="urdf with its mesh and actuators.json, glb, mjcf, step with bom.csv.",
+            help="urdf with its mesh and actuators.json, glb, mjcf, sdf with its mesh, step with "
+            "bom.csv.",
             help_behavior_hint=f"(default: {' '.join(FORMATS)})",
         ),
     ] = FORMATS,
+    ros2: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="DIR",
+            help="Write a ROS 2 package into this folder, and nothing else.",
+            help_behavior_hint="(default: none)",
+        ),
+    ] = None,
     json: JsonOutput = False,
 ) -> int:
     """Write a robot as URDF with an actuator table, as glTF for viewers, as MJCF, and for CAD."""
     check_folder(out)
+    check_folder(ros2, "ros2")
+    if ros2 is not None and (out is not None or formats != FORMATS):
+        cause = "--ros2 writes a package alone, with its own files"
+        raise DraftError(cause, "omit --out and --format, or run 'draft export' a second time")
     resolved, clock = open_design(reference, design, values)
     folder = None
     if resolved.accepted:
-        from draft.model.export import export
+        from draft.model.export import export, export_ros2
 
         model = resolved.build()
         clock.lap("build")
-        folder = export(model, out if out is not None else default_folder(resolved), formats)
+        if ros2 is not None:
+            folder = export_ros2(model, ros2)
+        else:
+            folder = export(model, out if out is not None else default_folder(resolved), formats)
         clock.lap("save")
     if json:
         print(record(resolved, clock, folder))

@@ -24,7 +24,8 @@ def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = 
         folder: folder to write, atomically; files that Draft wrote there before are replaced.
         formats: "urdf" (robot.urdf, meshes/trunk.stl and actuators.json with what URDF cannot
             hold: armature [kg m2], gains [N m/rad, N m s/rad]), "glb" (robot.glb, lengths in m),
-            "mjcf" (robot.xml, scene.xml), "step" (robot.step in mm and bom.csv; extra `cad`),
+            "mjcf" (robot.xml, scene.xml), "sdf" (robot.sdf, model.config, meshes/trunk.stl),
+            "step" (robot.step in mm and bom.csv; extra `cad`),
             and those of extensions.
 
     Returns:
@@ -39,3 +40,30 @@ def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = 
     """
     model = design.build() if isinstance(design, Design) else design
     return model.save(folder, formats)
+
+
+def export_ros2(design: Design | Model, folder: str | Path) -> Path:
+    """Write a robot as a package for ROS 2, which colcon builds.
+
+        >>> folder = draft.export_ros2(draft.load("hopper").resolve(), "hopper_description")
+        >>> sorted(path.name for path in folder.iterdir() if path.is_dir())
+        ['config', 'launch', 'meshes', 'urdf', 'worlds']
+
+    Args:
+        design: a single design, or its model if that is built already.
+        folder: folder of the package, written atomically; a package that Draft wrote there before
+            is replaced.
+
+    Returns:
+        The folder.
+
+    Raises:
+        RefusedError: the design filter found errors.
+        ModelError: MuJoCo does not accept the model.
+        DraftError: the design is N designs, or the folder holds files that Draft did not write, or
+            cannot be written.
+    """
+    from draft.model.ros2.package import save_package
+
+    model = design.build() if isinstance(design, Design) else design
+    return save_package(model, Path(folder))

@@ -66,7 +66,9 @@ def exporter(*files: str) -> Callable[[Write], Write]:
         taken = _paths(one for one in EXPORTERS.present.values() if one.name != name)
         for file in files:
             path = PurePosixPath(file)
-            if path.is_absolute() or ".." in path.parts or str(path) != file or file in taken:
+            # Draft's own share the mesh of the trunk.
+            others = origin != __name__ and file in taken
+            if path.is_absolute() or ".." in path.parts or str(path) != file or others:
                 cause = f"the exporter '{name}' of {origin} cannot write '{file}'"
                 raise DraftError(cause, "choose another path in the folder of a model")
         doc = (inspect.getdoc(function) or "").partition("\n")[0]
@@ -121,11 +123,23 @@ def urdf(model: Model) -> dict[str, str | bytes]:
     from draft.model import urdf as format_
 
     table: dict[str, Any] = plain(format_.actuators(model.design))
-    trunk = model.design.lofted
     return {
         "robot.urdf": format_.robot_urdf(model),
-        **({} if trunk is None else {format_.TRUNK: format_.trunk_stl(trunk.loft)}),
+        **format_.meshes(model.design),
         "actuators.json": json.dumps(table, indent=2) + "\n",
+    }
+
+
+@exporter("robot.sdf", "model.config", "meshes/trunk.stl")
+def sdf(model: Model) -> dict[str, str | bytes]:
+    """SDFormat with the mesh of the trunk, as a folder that Gazebo finds as a model."""
+    from draft.model.sdf import model_config, robot_sdf
+    from draft.model.urdf import meshes
+
+    return {
+        "robot.sdf": robot_sdf(model),
+        "model.config": model_config(model),
+        **meshes(model.design),
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,8 +42,8 @@ def save(
         folder: folder to write. Everything that Draft wrote there before is removed, so that all
             files are of one design.
         formats: names of `EXPORTERS`: "mjcf" is robot.xml and scene.xml; "urdf" is robot.urdf,
-            meshes/trunk.stl and actuators.json; "glb" is robot.glb; "step" is robot.step and
-            bom.csv.
+            meshes/trunk.stl and actuators.json; "sdf" is robot.sdf, model.config and
+            meshes/trunk.stl; "glb" is robot.glb; "step" is robot.step and bom.csv.
         more: text of further files by name, all of them known.
 
     Returns:
@@ -55,11 +55,13 @@ def save(
         ModelError: MuJoCo does not accept the scene, or the CAD kernel the trunk.
     """
     check_formats(formats)
-    try:
-        _check_target(folder)
-    except OSError as error:
-        raise cannot_write(folder, error, _REMEDY) from None
-    files = _files(model, formats) | dict(more or {})
+    check_target(folder, known_files(), "Draft model")
+    files = {path: text for name in formats for path, text in contents(model, name).items()}
+    return write_folder(folder, files | records(model) | dict(more or {}))
+
+
+def write_folder(folder: Path, files: Mapping[str, str | bytes]) -> Path:
+    """Write the contents of files by path into a folder, all or none; return the folder."""
     with new_folder(folder, _REMEDY) as temporary:
         for name, content in files.items():
             path = temporary / name
@@ -114,26 +116,38 @@ def _dumped(data: Any) -> str:
     return heading + yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
 
 
-def _check_target(folder: Path) -> None:
-    """Refuse to replace a folder that is not a model written by Draft."""
-    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise DraftError(f"'{folder}' exists and is not a folder", _REMEDY)
-    if folder.is_dir() and any(folder.iterdir()):
+def check_target(folder: Path, known: Set[str], what: str) -> None:
+    """Refuse to replace what is not a folder that Draft wrote.
+
+    Args:
+        folder: the folder.
+        known: paths of all files and folders that Draft may have written there.
+        what: what such a folder is, for messages.
+
+    Raises:
+        DraftError: it is none, or it cannot be read.
+    """
+    try:
+        if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+            raise DraftError(f"'{folder}' exists and is not a folder", _REMEDY)
+        if not folder.is_dir() or not any(folder.iterdir()):
+            return
         found = (path.relative_to(folder).as_posix() for path in folder.rglob("*"))
-        others = sorted({*found} - known_files())
+        others = sorted({*found} - known)
         if others or not (folder / "report.json").is_file():
             held = f"it holds {', '.join(others[:4])}" if others else "it has no report.json"
-            cause = f"'{folder}' is not a folder of a Draft model ({held}); it is kept"
+            cause = f"'{folder}' is not a folder of a {what} ({held}); it is kept"
             raise DraftError(cause, f"{_REMEDY}, or empty the folder")
+    except OSError as error:
+        raise cannot_write(folder, error, _REMEDY) from None
 
 
-def _files(model: Model, formats: Sequence[str]) -> dict[str, str | bytes]:
-    """Contents of the files, by path in the folder."""
+def records(model: Model) -> dict[str, str | bytes]:
+    """Contents of design.yaml and report.json."""
     record = report(model.design) | {
         "versions": {"draft": own_version(), "mujoco": mujoco.__version__}
     }
-    files = {path: text for name in formats for path, text in contents(model, name).items()}
-    return files | {
+    return {
         "design.yaml": design_text(model.design),
         "report.json": json.dumps(plain(record), indent=2) + "\n",
     }

@@ -26,10 +26,13 @@ from draft.values import Array, scalar
 if TYPE_CHECKING:
     from draft.model.model import Model
 
+DECLARATION = '<?xml version="1.0"?>\n'
 TRUNK = "meshes/trunk.stl"
 # URDF requires a velocity limit, also for a joint without an actuator [rad/s or m/s].
 _NO_LIMIT = 1000.0
 _GIMBAL = 1e-9
+# Of a link without mass, where a format has none [kg], [kg m2]; Gazebo takes 1e-6 kg for none.
+LEAST_MASS, LEAST_INERTIA = 1e-5, 1e-8
 # Quantities of a module that its joint has under another name, or does not show.
 _OF_MODULE = (
     *("aspect_ratio", "mass", "volume", "radius", "length", "width", "height"),
@@ -46,7 +49,7 @@ _CORNERED = (
 
 def robot_urdf(model: Model) -> str:
     """URDF text of the robot; it refers to the mesh `meshes/trunk.stl` in the same folder."""
-    root = Element("robot", name=model.design.name)
+    root = robot_element(model, TRUNK)
     root.add("mujoco").add(
         "compiler",
         strippath="false",
@@ -54,16 +57,30 @@ def robot_urdf(model: Model) -> str:
         discardvisual="false",
         inertiafromgeom="false",
     )
+    return DECLARATION + root.text()
+
+
+def robot_element(model: Model, mesh: str, gazebo: bool = False) -> Element:
+    """URDF of the robot as elements.
+
+    Args:
+        model: the model.
+        mesh: file of the trunk's mesh as URDF names it.
+        gazebo: whether it is for Gazebo, which needs a mass of every link, and names of joints that
+            differ from those of links.
+    """
+    root = Element("robot", name=model.design.name)
     for name, color in colors(model.design).items():
         root.add("material", name=name).add("color", rgba=color)
     if not model.design.floating:
         root.add("link", name="world")
     drawn = shapes(model.mujoco, model.design)
     for i, body in enumerate(model.design.bodies):
-        _link(root, model.mujoco, i + 1, [shape for shape in drawn if shape.body == i + 1])
+        own = [shape for shape in drawn if shape.body == i + 1]
+        _link(root, model.mujoco, i + 1, own, mesh, gazebo)
         if body.parent is not None or not model.design.floating:
-            _joint(root, model, body, i + 1)
-    return '<?xml version="1.0"?>\n' + root.text()
+            _joint(root, model, body, i + 1, gazebo)
+    return root
 
 
 def actuators(design: Design) -> dict[str, Any]:
@@ -106,6 +123,11 @@ def actuators(design: Design) -> dict[str, Any]:
     }
 
 
+def meshes(design: Design) -> dict[str, bytes]:
+    """Bytes of the mesh of the trunk by its path; a fixed base has none."""
+    return {} if design.lofted is None else {TRUNK: trunk_stl(design.lofted.loft)}
+
+
 def trunk_stl(loft: Loft) -> bytes:
     """Bytes of a binary STL file of the trunk in its own frame [m]."""
     corners = loft.vertices[loft.faces()]
@@ -129,32 +151,45 @@ def rpy(rotation: Array) -> tuple[float, float, float]:
     return roll, pitch, math.atan2(rotation[1, 0], rotation[0, 0])
 
 
-def _link(root: Element, model: mujoco.MjModel, i: int, drawn: list[Shape]) -> None:
+def tensor(model: mujoco.MjModel, i: int) -> dict[str, float]:
+    """Inertia of a body about its centre of mass in the axes of its link [kg m2], as URDF says.
+
+    That of a body without mass is the least one.
+    """
+    if not model.body_mass[i]:
+        return {
+            f"i{a}{b}": LEAST_INERTIA * (a == b) for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")
+        }
+    axes = matrix(model.body_iquat[i])
+    full = axes @ np.diag(model.body_inertia[i]) @ axes.T
+    indices = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
+    return {f"i{name}": float(full[at]) for name, at in indices.items()}
+
+
+def _link(
+    root: Element, model: mujoco.MjModel, i: int, drawn: list[Shape], mesh: str, least: bool
+) -> None:
     link = root.add("link", name=model.body(i).name)
-    mass = float(model.body_mass[i])
+    mass = float(model.body_mass[i]) or (LEAST_MASS if least else 0.0)
     if mass > 0:
-        axes = matrix(model.body_iquat[i])
-        tensor = axes @ np.diag(model.body_inertia[i]) @ axes.T
         inertial = link.add("inertial")
         inertial.add("origin", xyz=model.body_ipos[i], rpy=(0, 0, 0))
         inertial.add("mass", value=mass)
-        indices = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2)}
-        indices |= {"yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
-        inertial.add("inertia", **{f"i{name}": float(tensor[at]) for name, at in indices.items()})
+        inertial.add("inertia", **tensor(model, i))
     for shape in drawn:
-        visual = _shape(link, "visual", shape, shape.name)
+        visual = _shape(link, "visual", shape, shape.name, mesh)
         visual.add("material", name=shape.kind)
         if shape.collides:
-            _shape(link, "collision", shape, f"{shape.name}_collision")
+            _shape(link, "collision", shape, f"{shape.name}_collision", mesh)
 
 
-def _shape(link: Element, use: str, shape: Shape, name: str) -> Element:
+def _shape(link: Element, use: str, shape: Shape, name: str, mesh: str) -> Element:
     element = link.add(use, name=name)
     element.add("origin", xyz=shape.position, rpy=rpy(shape.rotation))
     geometry = element.add("geometry")
     size = shape.size
     if shape.form == "mesh":
-        geometry.add("mesh", filename=TRUNK)
+        geometry.add("mesh", filename=mesh)
     elif shape.form == "box":
         geometry.add("box", size=2 * size)
     elif shape.form == "sphere":
@@ -164,12 +199,12 @@ def _shape(link: Element, use: str, shape: Shape, name: str) -> Element:
     return element
 
 
-def _joint(root: Element, model: Model, body: Body, i: int) -> None:
+def _joint(root: Element, model: Model, body: Body, i: int, gazebo: bool) -> None:
     compiled, design, joint = model.mujoco, model.design, body.joint
     parent = compiled.body(compiled.body_parentid[i]).name
     kind = "fixed" if joint is None else joint.kind
-    name = _fixed_name(design, body) if joint is None else body.prefix + joint.name
-    element = root.add("joint", name=name, type=kind)
+    name = joint_name(design, body)
+    element = root.add("joint", name=distinct_name(design, name) if gazebo else name, type=kind)
     element.add("origin", xyz=compiled.body_pos[i], rpy=rpy(matrix(compiled.body_quat[i])))
     element.add("parent", link=parent)
     element.add("child", link=body.name)
@@ -187,13 +222,23 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
     )
     if (follows := joint.follows) is not None:
         multiplier, offset = scalar(follows.ratio), scalar(follows.offset)
-        element.add("mimic", joint=follows.joint, multiplier=multiplier, offset=offset)
+        leader = distinct_name(design, follows.joint) if gazebo else follows.joint
+        element.add("mimic", joint=leader, multiplier=multiplier, offset=offset)
     if a:
         element.add("dynamics", damping=scalar(a.damping), friction=scalar(a.friction_loss))
 
 
-def _fixed_name(design: Design, body: Body) -> str:
-    """Name of a fixed joint, different from that of every moving joint."""
+def distinct_name(design: Design, joint: str) -> str:
+    """Name for a joint that differs from that of every link, as SDFormat needs."""
+    while any(joint == body.name for body in design.bodies):
+        joint += "_joint"
+    return joint
+
+
+def joint_name(design: Design, body: Body) -> str:
+    """Name of the joint of a body; a fixed one has a name different from every moving joint's."""
+    if body.joint is not None:
+        return body.prefix + body.joint.name
     name = f"{body.name}_weld"
     while name in design.joints:
         name += "_"

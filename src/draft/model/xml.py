@@ -42,6 +42,10 @@ class Element:
         self.children.append(child)
         return child
 
+    def put(self, tag: str, content: Attribute, **attributes: Attribute) -> None:
+        """Append a child that holds a string, a number or several numbers."""
+        self.children.append(_Leaf(tag, _formatted(content), attributes))
+
     def alone(self) -> Element:
         """Return the element without its children; both have the same attributes."""
         one = Element.__new__(Element)
@@ -121,6 +125,19 @@ class Element:
         return " ".join(words)
 
 
+class _Leaf(Element):
+    """An element that holds a text."""
+
+    __slots__ = ("content",)
+
+    def __init__(self, tag: str, content: str, attributes: dict[str, Any]) -> None:
+        super().__init__(tag, **attributes)
+        self.content = content
+
+    def _write(self, lines: list[str], indent: str) -> None:
+        lines.append(f"{indent}<{self._written()}>{self.content}</{self.tag}>")
+
+
 def parse(text: str) -> Element:
     """Read what `Element.text` wrote; attributes stay strings.
 
@@ -153,7 +170,7 @@ _LINE = re.compile(r'<(?P<tag>\w+)(?P<attributes>(?: \w+="[^"<>]*")*)(?P<closed>
 _QUOTE = {'"': "&quot;"}
 
 
-def _formatted(value: str | float | Iterable[float]) -> str:
+def _formatted(value: Any) -> str:
     if isinstance(value, str):
         return value if value.isidentifier() else escape(value, _QUOTE)
     return _numbers((value,) if isinstance(value, (int, float)) else tuple(value))

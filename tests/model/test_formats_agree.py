@@ -1,0 +1,290 @@
+"""All formats are one robot: each is read by a library of its own, and their numbers are compared.
+
+MuJoCo reads MJCF, Pinocchio reads URDF, Drake reads SDFormat. No reader shares code with Draft.
+"""
+
+# pyright: reportAttributeAccessIssue=false
+# (Compiled modules carry no types.)
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import pytest
+
+import draft
+from draft.model.urdf import LEAST_MASS
+from draft.values import scalar
+from tests.helpers import robot as robot_of
+from tests.model.shipped import SHIPPED, built
+from tests.model.test_coupling import coupled_hand
+from tests.model.test_slides import telescope
+
+Array = np.ndarray
+COUPLED = "coupled hand"
+SLIDE = "telescope"
+ROBOTS = [*SHIPPED, (COUPLED, None), (SLIDE, None)]
+# Files have ten significant digits; MuJoCo keeps the vertices of a mesh in single precision.
+CLOSE, COARSE = 1e-7, 1e-6
+
+
+@dataclass
+class Body:
+    """Mass [kg], centre of mass [m] and inertia about it [kg m2] in the world, in the home pose."""
+
+    mass: float
+    center: Array
+    inertia: Array
+
+
+@dataclass
+class Joint:
+    """Axis, and of a hinge a point on it, in the world in the home pose; limits in SI units."""
+
+    axis: Array
+    point: Array | None
+    range: tuple[float, float] | None
+    torque: float
+    speed: float | None
+    follows: tuple[str, float, float] | None = None
+
+
+@dataclass
+class Robot:
+    bodies: dict[str, Body] = field(default_factory=dict)
+    joints: dict[str, Joint] = field(default_factory=dict)
+
+    def total(self) -> Body:
+        """The whole as one body."""
+        parts = [part for part in self.bodies.values() if part.mass > LEAST_MASS]
+        mass = sum(part.mass for part in parts)
+        center = sum((part.mass * part.center for part in parts), np.zeros(3)) / mass
+        inertia = np.zeros((3, 3))
+        for part in parts:
+            arm = part.center - center
+            inertia += part.inertia + part.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        return Body(mass, center, inertia)
+
+
+def by_mujoco(folder: Path, home: dict[str, float], floating: bool) -> Robot:
+    """MJCF as MuJoCo reads it; torques and speeds are those of the motors of its scene."""
+    model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+    data = mujoco.MjData(model)
+    data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0) if floating else data.qpos[:7]
+    for name, value in home.items():
+        data.qpos[model.joint(name).qposadr[0]] = value
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    robot = Robot()
+    for i in range(1, model.nbody):
+        axes = data.ximat[i].reshape(3, 3)
+        inertia = axes @ np.diag(model.body_inertia[i]) @ axes.T
+        robot.bodies[model.body(i).name] = Body(model.body_mass[i], data.xipos[i], inertia)
+    coupled = {
+        model.joint(model.eq_obj1id[i]).name: (
+            model.joint(model.eq_obj2id[i]).name,
+            model.eq_data[i, 1],
+            model.eq_data[i, 0],
+        )
+        for i in range(model.neq)
+    }
+    for name in home:
+        one = model.joint(name)
+        torque, speed = 0.0, None
+        if name in (model.actuator(i).name for i in range(model.nu)):
+            torque, speed = model.numeric(f"{name}_dc_motor").data[:2]
+            assert torque == pytest.approx(model.actuator(name).forcerange[1], rel=CLOSE)
+        limits = tuple(one.range) if model.jnt_limited[one.id] else None
+        hinge = model.jnt_type[one.id] == mujoco.mjtJoint.mjJNT_HINGE
+        point = data.xanchor[one.id] if hinge else None
+        follows = coupled.get(name)
+        robot.joints[name] = Joint(data.xaxis[one.id], point, limits, torque, speed, follows)
+    return robot
+
+
+def by_pinocchio(folder: Path, home: dict[str, float], floating: bool) -> Robot:
+    """URDF as Pinocchio reads it, which keeps the inertia of each link with its frame."""
+    pinocchio = pytest.importorskip("pinocchio")
+    base = (pinocchio.JointModelFreeFlyer(),) if floating else ()
+    model = pinocchio.buildModelFromUrdf(str(folder / "robot.urdf"), *base)
+    linked = pinocchio.buildModelFromUrdf(str(folder / "robot.urdf"), *base, mimic=True)
+    data, q = model.createData(), pinocchio.neutral(model)
+    for name, value in home.items():
+        one = model.joints[model.getJointId(name)]
+        turn = [value] if one.nq == 1 else [math.cos(value), math.sin(value)]
+        q[one.idx_q : one.idx_q + one.nq] = turn
+    pinocchio.framesForwardKinematics(model, data, q)
+    robot = Robot()
+    kinds = pinocchio.FrameType
+    fixed = [one for one in model.frames if one.type == kinds.FIXED_JOINT]
+    for frame in model.frames:
+        if frame.type != kinds.BODY or frame.name == "world":
+            continue
+        # Of what is fixed to a link, Pinocchio adds the inertia to that of the joint.
+        above = model.frames[frame.parentFrame]
+        welds = [above] if above.type == kinds.FIXED_JOINT else fixed
+        parts = [
+            one.placement.act(one.inertia).toDynamicParameters()
+            for one in welds
+            if one.parentJoint == frame.parentJoint
+        ]
+        own = sum(parts, np.zeros(10))
+        if above.type == kinds.JOINT:
+            own = model.inertias[frame.parentJoint].toDynamicParameters() - own
+        place = data.oMi[frame.parentJoint]
+        weighs = pinocchio.Inertia.FromDynamicParameters
+        moved = place.act(weighs(own) if own[0] > 0 else pinocchio.Inertia.Zero())
+        robot.bodies[frame.name] = Body(moved.mass, moved.lever, moved.inertia)
+    pairs = dict(zip(linked.mimicking_joints, linked.mimicked_joints, strict=True))
+    pinocchio.computeJointJacobians(model, data, q)
+    world = pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    for name in home:
+        number, other = model.getJointId(name), linked.getJointId(name)
+        one, place = model.joints[number], data.oMi[number]
+        axis = pinocchio.getJointJacobian(model, data, number, world)[:, one.idx_v]
+        turning = np.linalg.norm(axis[3:]) > 0.5
+        span = model.lowerPositionLimit, model.upperPositionLimit
+        limits = (span[0][one.idx_q], span[1][one.idx_q]) if one.nq == 1 else None
+        follows = None
+        if other in pairs:
+            held = linked.joints[other].extract()
+            follows = (linked.names[pairs[other]], held.scaling, held.offset)
+        robot.joints[name] = Joint(
+            axis[3:] if turning else axis[:3],
+            place.translation if turning else None,
+            limits,
+            float(model.upperEffortLimit[one.idx_v]),
+            float(model.upperVelocityLimit[one.idx_v]),
+            follows,
+        )
+    return robot
+
+
+def follows_in_sdf(folder: Path) -> dict[str, tuple[str, float, float]]:
+    """Couplings of the file, which Drake counts but does not show."""
+    found = {}
+    for one in ElementTree.parse(folder / "robot.sdf").iter("joint"):
+        if (mimic := one.find("axis/mimic")) is not None:
+            numbers = (float(mimic.findtext(tag, "nan")) for tag in ("multiplier", "offset"))
+            names = (str(at.get(key)) for at, key in ((one, "name"), (mimic, "joint")))
+            name, leader = (text.removesuffix("_joint") for text in names)
+            found[name] = (leader, *numbers)
+    return found
+
+
+def by_drake(folder: Path, home: dict[str, float], floating: bool) -> Robot:
+    """SDFormat as Drake reads it, by the parser of Gazebo."""
+    pytest.importorskip("pydrake.multibody.parsing", reason="drake has no wheel for this system")
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
+    from pydrake.multibody.tree import RevoluteJoint
+
+    plant: Any = MultibodyPlant(0.001)
+
+    def joint_of(name: str) -> Any:
+        """Joint; one that has the name of a link has another name in SDFormat."""
+        return plant.GetJointByName(f"{name}_joint" if plant.HasBodyNamed(name) else name)
+
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)  # for mimic
+    (instance,) = Parser(plant).AddModels(folder / "robot.sdf")
+    plant.Finalize()
+    for name, value in home.items():
+        joint_of(name).set_default_positions([value])
+    context = plant.CreateDefaultContext()
+    bodies = [plant.get_body(i) for i in plant.GetBodyIndices(instance)]
+    if floating:
+        from pydrake.math import RigidTransform
+
+        plant.SetFreeBodyPose(context, bodies[0], RigidTransform())
+    robot = Robot()
+    for body in bodies:
+        pose = plant.EvalBodyPoseInWorld(context, body)
+        turn = pose.rotation().matrix()
+        own = body.CalcSpatialInertiaInBodyFrame(context)
+        center = own.get_com()
+        inertia = own.Shift(center).CalcRotationalInertia().CopyToFullMatrix3()
+        place = pose.translation() + turn @ center
+        robot.bodies[body.name()] = Body(own.get_mass(), place, turn @ inertia @ turn.T)
+    drives = {
+        plant.get_joint_actuator(i).joint().name(): plant.get_joint_actuator(i)
+        for i in plant.GetJointActuatorIndices()
+    }
+    coupled = follows_in_sdf(folder)
+    assert plant.num_constraints() == len(coupled)
+    for name in home:
+        joint = joint_of(name)
+        frame = joint.frame_on_parent().CalcPoseInWorld(context)
+        hinge = isinstance(joint, RevoluteJoint)
+        axis = joint.revolute_axis() if hinge else joint.translation_axis()
+        low, high = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
+        robot.joints[name] = Joint(
+            frame.rotation().matrix() @ axis,
+            frame.translation() if hinge else None,
+            (low, high) if np.isfinite(low) else None,
+            drives[joint.name()].effort_limit() if joint.name() in drives else 0.0,
+            joint.velocity_upper_limits()[0] if joint.name() in drives else None,
+            coupled.get(name),
+        )
+    return robot
+
+
+READERS: list[Callable[[Path, dict[str, float], bool], Robot]] = [by_pinocchio, by_drake]
+
+
+@cache
+def model_of(name: str, label: str | None) -> draft.Model:
+    if name == COUPLED:
+        return coupled_hand().resolve().build()
+    if name == SLIDE:
+        return robot_of(telescope()).resolve().build()
+    return built(name, label)
+
+
+@pytest.fixture(scope="module", params=ROBOTS, ids=lambda pair: "-".join(filter(None, pair)))
+def exported(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[draft.Model, Path]:
+    model = model_of(*request.param)
+    return model, model.save(tmp_path_factory.mktemp("robot") / "out", ("mjcf", "urdf", "sdf"))
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_every_format_is_the_robot_of_the_mjcf(
+    read: Callable[[Path, dict[str, float], bool], Robot], exported: tuple[draft.Model, Path]
+) -> None:
+    model, folder = exported
+    home = {name: scalar(joint.home) for name, joint in model.design.joints.items()}
+    ours = by_mujoco(folder, home, model.design.floating)
+    found = read(folder, home, model.design.floating)
+    assert found.bodies.keys() == ours.bodies.keys()
+    whole = ours.total()
+    size = np.trace(whole.inertia)
+    for name, expected in {**ours.bodies, "": whole}.items():
+        body = found.bodies[name] if name else found.total()
+        if expected.mass == 0:  # SDFormat has no link without mass
+            assert body.mass <= LEAST_MASS, name
+            continue
+        assert body.mass == pytest.approx(expected.mass, rel=COARSE), name
+        assert body.center == pytest.approx(expected.center, abs=COARSE), name
+        assert np.abs(body.inertia - expected.inertia).max() < CLOSE * size, name
+        own = np.trace(expected.inertia)
+        assert np.abs(body.inertia - expected.inertia).max() < 1e-5 * own, name
+    for name, expected in ours.joints.items():
+        joint = found.joints[name]
+        assert joint.axis == pytest.approx(expected.axis, abs=CLOSE), name
+        if expected.point is not None:
+            assert joint.point == pytest.approx(expected.point, abs=COARSE), name
+        assert joint.follows == pytest.approx(expected.follows), name
+        assert (joint.range is None) == (expected.range is None), name
+        if joint.range is not None:
+            assert joint.range == pytest.approx(expected.range, abs=CLOSE), name
+        assert joint.torque == pytest.approx(expected.torque, rel=CLOSE), name
+        if expected.speed is not None:
+            assert joint.speed == pytest.approx(expected.speed, rel=CLOSE), name
