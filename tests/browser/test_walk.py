@@ -55,7 +55,7 @@ def test_states_observations_actions_and_torques_are_the_native_ones(
     command = [0.6 * chosen.policy.forward, 0.05, 0.2]
     rows = tab.evaluate(RECORD, [command, STEPS])
     walk = Walk(model, chosen, (command[0], command[1], command[2]))
-    peak = chosen.policy.peak_torque
+    peak, seen = chosen.policy.peak_torque, walk.controller.observe(walk.data, command)
     for i, (position, observation, action, torque) in enumerate(rows):
         if i % round(chosen.policy.control_period / chosen.policy.timestep) == 0:
             seen = walk.controller.observe(walk.data, command)
