@@ -20,6 +20,7 @@ import draft
 NEEDS = {
     "evaluate": ("mjlab", "pyarrow"),
     "optimise": ("optuna", "scipy"),
+    "page": ("mjswan",),
     "report": ("plotly",),
     "screen": ("pyarrow", "scipy"),
     "surface": ("mjlab", "pyarrow", "scipy"),

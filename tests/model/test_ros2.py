@@ -242,7 +242,9 @@ def test_the_parser_of_gazebo_keeps_every_link_and_finds_the_feet(
     wanted = {one.text for one in root.iterfind(".//contact/collision")}
     assert wanted <= shapes
     source = ElementTree.parse(path).getroot()
-    weighing = [one.get("name") for one in source.findall("link") if one.find("inertial")]
+    weighing = [
+        one.get("name") for one in source.findall("link") if one.find("inertial") is not None
+    ]
     floating = source.find("link[@name='world']") is None
     kept = {one.get("name") for one in root.iter("link")}
     assert kept == {*weighing} if floating else kept <= {*weighing}
