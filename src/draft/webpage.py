@@ -45,7 +45,7 @@ def webpage(
             '<link rel="icon" href="data:,">',
             f"<title>{escape(title)}</title>",
             f"<style>\n{style}</style>",
-            "" if modules is None else _imports(modules),
+            *([] if modules is None else [_imports(modules)]),
             "</head>\n<body>",
             body,
             *(f"<script{kind}>{script}</script>" for script in scripts),

@@ -82,8 +82,7 @@ def grid(model: Model, vary: Vary, skill: str, policies: Sequence[AnyPolicy]) ->
     axes = parse(design.spec, vary)
     _check(axes)
     space = _Space(model, axes)
-    nodes, errors = _refined(space)
-    table = space.table(nodes)
+    nodes, table, errors = _refined(space)
     names, values, steps = list(table.names), table.values, table.steps
     many = space.designs(nodes)
     models = [preview(many[i]) for i in range(len(values))]
@@ -229,8 +228,8 @@ def _allowed(name: str, values: Array) -> Array:
     return share * np.maximum(size, 1e-12)
 
 
-def _refined(space: _Space) -> tuple[list[Array], dict[str, float]]:
-    """Values of the nodes along each axis, and the largest errors between them.
+def _refined(space: _Space) -> tuple[list[Array], _Table, dict[str, float]]:
+    """Values of the nodes along each axis, their bodies, and the largest errors between them.
 
     Intervals in whose middle a number is off by more than a share of its bar are halved, as where
     a law of Draft has a kink. The share falls until the middles of all cells are within the bars.
@@ -253,7 +252,7 @@ def _refined(space: _Space) -> tuple[list[Array], dict[str, float]]:
             off = _off(space, middles, _halfway(values, range(len(shares))), known.steps)
             ratio = off.reshape(-1, off.shape[-1]).max(axis=0)
             if ratio.max(initial=0.0) <= 1.0:
-                return nodes, _errors(known, ratio)
+                return nodes, known, _errors(known, ratio)
             most /= 2
         shares = finer
         if math.prod(map(len, shares)) > _MOST_NODES:

@@ -9,7 +9,7 @@ import { Robot } from "draft/robot";
 import { Steering } from "draft/steer";
 
 const LATE = 0.1; // Time that is caught up with at most [s].
-const PUSH = 0.35; // Velocity of a push per sqrt(g L) of the legs.
+const PUSH = 0.35; // Velocity of a push per sqrt(g h), h the height of the robot's middle.
 const SMOOTH = 0.03; // Weight of the newest speed in the one that is shown.
 const $ = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 

@@ -121,7 +121,7 @@ def _contents(
 ) -> dict[str, str | bytes]:
     """Contents of the files by name, the page first."""
     modules = _modules()
-    parts = {"mujoco.wasm": _packed_engine()}
+    parts = {"mujoco.wasm": gzip.compress(engine().wasm, 6, mtime=0)}
     plain = []
     for one in robots:
         record = dict(one.plain)
@@ -188,10 +188,6 @@ def _inlined(text: str) -> str:
 def _inside(name: str, kind: str, text: str) -> str:
     """A text within the page, from which no tag can lead out."""
     return f'<script id="{name}" type="{kind}">{text.replace("<", chr(92) + "u003c")}</script>\n'
-
-
-def _packed_engine() -> bytes:
-    return gzip.compress(engine().wasm, 6, mtime=0)
 
 
 def _lanes(robots: Sequence[PageRobot]) -> list[float]:

@@ -5,8 +5,8 @@ import { principal, tensors, unit } from "draft/inertia";
 const CLEAR = 0.005, EVEN = 1e-4; // As in `walk.py`: height above the floor, depth in it [m].
 const DOWN = 1.0; // Time that a fallen robot lies before it starts again [s].
 // The floor is the first geom, which the grid's models, of robots alone, lack.
-const START = /** @type {Record<string, (model: any) => number>} */ ({
-  geom_size: () => 3, geom_pos: () => 3, geom_quat: () => 4, geom_rbound: () => 1, geom_aabb: () => 6,
+const START = /** @type {Record<string, number>} */ ({
+  geom_size: 3, geom_pos: 3, geom_quat: 4, geom_rbound: 1, geom_aabb: 6,
 });
 const VIEWS = ["qpos", "qvel", "qfrc_applied", "sensordata", "xmat", "xpos", "geom_xpos", "geom_xmat"];
 
@@ -125,7 +125,7 @@ export class Robot {
       if (name.startsWith("number ")) put((numbers[name.slice(7)] = [...numbers[name.slice(7)]]));
       else if (name === "network") this.network?.put(places[name], values);
       else if (name === "body_tensor") put(this.tensors);
-      else put(model[name], START[name]?.(model) ?? 0);
+      else put(model[name], START[name] ?? 0);
     }
     principal(this.tensors, model.body_inertia, model.body_iquat);
     for (const name of ["body_quat", "geom_quat"]) if (name in columns) unit(model[name]);

@@ -14,7 +14,7 @@ from draft.spec.primitives import colors
 from draft.values import Array
 
 Form = Literal["mesh", "box", "cylinder", "sphere"]
-FORMS: dict[int, Form] = {
+_FORMS: dict[int, Form] = {
     int(mujoco.mjtGeom.mjGEOM_MESH): "mesh",
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
@@ -53,7 +53,7 @@ def shapes(model: mujoco.MjModel, design: Design) -> list[Shape]:
     # A compiled model has no geom classes, but colours, in single precision, identify them.
     kinds = {tuple(np.array(color, np.float32)): kind for kind, color in colors().items()}
     for i in range(model.ngeom):
-        form = FORMS[int(model.geom_type[i])]
+        form = _FORMS[int(model.geom_type[i])]
         name = model.geom(i).name
         # MuJoCo moves a mesh into its principal frame; the loft is in the frame of the body.
         moved = form == "mesh"
