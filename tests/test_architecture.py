@@ -34,6 +34,7 @@ GROUND = {
     "plotting",
     "settings",
     "webpage",
+    "drawing",
 }
 # What each part of the house may import, besides itself and the ground it stands on.
 BELOW: dict[str, set[str]] = {

@@ -10,8 +10,9 @@ _POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-
 _PICTURES = "img-src data:"
 # Plotly saves pictures as blobs.
 _SCRIPTS = "script-src 'unsafe-inline'; img-src data: blob:"
-# MuJoCo's bindings make functions from strings, which are their own.
-_MODULES = "script-src 'self' data: 'unsafe-eval'"
+_MODULES = "script-src 'self' data:"
+# Compiling WebAssembly; MuJoCo's bindings make functions from strings, which are their own.
+_COMPILES = "script-src 'unsafe-eval'"
 
 
 def webpage(
@@ -21,6 +22,7 @@ def webpage(
     scripts: Sequence[str] = (),
     requests: bool = False,
     modules: Mapping[str, str] | None = None,
+    compiles: bool = False,
 ) -> str:
     """Text of an HTML page whose content policy forbids a browser to load anything else.
 
@@ -30,13 +32,13 @@ def webpage(
         body: HTML of the body, without its scripts.
         scripts: JavaScript that runs at the end of the body; without any, scripts are forbidden.
         requests: whether scripts may send requests to the server of the page.
-        modules: address of each module by the name that `import` gives it, for scripts that are
-            modules and may compile WebAssembly; None for plain scripts.
+        modules: address of each module by the name that `import` gives it; None without modules.
+        compiles: whether modules may compile WebAssembly.
     """
     policy = _POLICY + (_SCRIPTS if scripts else _PICTURES)
     policy = policy if modules is None else policy.replace("script-src", _MODULES)
+    policy = policy.replace("script-src", _COMPILES) if compiles else policy
     policy += "; connect-src 'self'" if requests else ""
-    kind = "" if modules is None else ' type="module"'
     return "\n".join(
         [
             '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
@@ -48,7 +50,7 @@ def webpage(
             *([] if modules is None else [_imports(modules)]),
             "</head>\n<body>",
             body,
-            *(f"<script{kind}>{script}</script>" for script in scripts),
+            *(f"<script>{script}</script>" for script in scripts),
             "</body>\n</html>\n",
         ]
     )

@@ -1,8 +1,7 @@
-"""MuJoCo and three.js for browsers: the texts and bytes of modules that a page loads.
+"""MuJoCo for browsers: text and bytes of the module that a page loads.
 
 MuJoCo in WebAssembly is that of the package mjswan (Apache-2.0), whose viewer is not used: it
 evaluates policies with 14 MB of ONNX Runtime, where a page of Draft multiplies a few matrices.
-three.js (MIT) is version 0.180.0, unchanged, with its licence in `vendor`.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ import re
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import distribution, requires
-from importlib.resources import files
 from pathlib import Path
 
 import mujoco
@@ -64,11 +62,3 @@ def engine() -> Engine:
             version, _RUNTIME.sub("const e = null;", text), (assets / wasm[0]).read_bytes()
         )
     raise DraftError(f"{assets} holds no MuJoCo that a page can load", "install mjswan 0.12.3")
-
-
-def drawing() -> dict[str, str]:
-    """Texts of the modules of three.js by name; the first imports the other by its name."""
-    folder = files("draft.browser") / "vendor"
-    core = (folder / "three.core.min.js").read_text("utf-8")
-    main = (folder / "three.module.min.js").read_text("utf-8")
-    return {"three": main.replace('"./three.core.min.js"', '"three/core"'), "three/core": core}

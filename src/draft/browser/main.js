@@ -219,7 +219,7 @@ class Page {
     this.picture.pace(gone);
     this.picture.draw();
     if (this.count.pictures++ % 15 === 0) this.report();
-    if ($("load").open) $("busiest").textContent = this.limits.draw(robot) || $("busiest").textContent;
+    if ($("load").open && this.count.pictures % 3 === 0) $("busiest").textContent = this.limits.draw(robot) || $("busiest").textContent;
   }
 
   report() {

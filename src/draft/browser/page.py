@@ -11,8 +11,8 @@ from importlib.resources import files as resources
 from itertools import pairwise
 from pathlib import Path
 
-from draft import files
-from draft.browser.engine import drawing, engine
+from draft import drawing, files
+from draft.browser.engine import engine
 from draft.browser.grid import Grid, grid
 from draft.browser.robots import PageRobot, compiled, driven, network_numbers, robot
 from draft.design import Design
@@ -144,13 +144,15 @@ def _contents(
     title = ", ".join(str(one["title"]) for one in plain)
     style = (resources("draft.browser") / "page.css").read_text("utf-8")
     if single:
-        inlined = {name: _inlined(text) for name, text in modules.items()}
+        inlined = {name: drawing.inlined(text) for name, text in modules.items()}
         for name, content in parts.items():
             body += _inside(f"part-{name}", "text/plain", base64.b64encode(content).decode())
-        found = webpage(title, style, body, ['import "draft/main";'], modules=inlined)
+        found = webpage(
+            title, style, body, ['import("draft/main");'], modules=inlined, compiles=True
+        )
         return {"index.html": found}
     addresses = {name: f"./{_file(name)}" for name in modules}
-    found = webpage(title, style, body, [_SERVED], requests=True, modules=addresses)
+    found = webpage(title, style, body, [_SERVED], requests=True, modules=addresses, compiles=True)
     mark = json.dumps({"draft": own_version(), "mujoco": engine().version})
     return {
         "index.html": found,
@@ -174,15 +176,11 @@ def _modules() -> dict[str, str]:
     own = {
         f"draft/{name}": (folder / f"{name}.js").read_text("utf-8") for name in (*_MODULES, "main")
     }
-    return {**own, "mujoco": engine().script, **drawing()}
+    return {**own, "mujoco": engine().script, **drawing.modules()}
 
 
 def _file(module: str) -> str:
     return f"{module.removeprefix('draft/').replace('/', '.')}.js"
-
-
-def _inlined(text: str) -> str:
-    return f"data:text/javascript;base64,{base64.b64encode(text.encode()).decode()}"
 
 
 def _inside(name: str, kind: str, text: str) -> str:
@@ -201,9 +199,8 @@ def _lanes(robots: Sequence[PageRobot]) -> list[float]:
 
 
 def _licences() -> str:
-    own = (resources("draft.browser") / "vendor" / "LICENSE-three").read_text("utf-8")
     return (
         "mujoco.js and mujoco.wasm: MuJoCo, Copyright DeepMind Technologies Limited, "
         "Apache License 2.0, https://www.apache.org/licenses/LICENSE-2.0\n\n"
-        f"three.js and three.core.js:\n\n{own}"
+        f"three.js and three.core.js:\n\n{drawing.licence()}"
     )

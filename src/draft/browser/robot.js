@@ -8,7 +8,7 @@ const DOWN = 1.0; // Time that a fallen robot lies before it starts again [s].
 const START = /** @type {Record<string, number>} */ ({
   geom_size: 3, geom_pos: 3, geom_quat: 4, geom_rbound: 1, geom_aabb: 6,
 });
-const VIEWS = ["qpos", "qvel", "qfrc_applied", "sensordata", "xmat", "xpos", "geom_xpos", "geom_xmat"];
+const VIEWS = ["qpos", "qvel", "qfrc_applied", "sensordata", "xmat", "xpos", "xquat"];
 
 /**
  * @typedef {object} Policy numbers of `draft.learn.policy.policy.Policy`, joints in its order
