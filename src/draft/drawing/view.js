@@ -36,6 +36,7 @@ export class View {
     this.pitch = 0.28;
     this.away = 1;
     this.size = 1;
+    this.changed = () => {}; // Called after a view that nobody else draws again has changed.
     this.target = this.box ? this.box.getCenter(new THREE.Vector3()) : new THREE.Vector3();
     place.append(this.renderer.domElement);
     this.drag();
@@ -105,9 +106,10 @@ export class View {
   resize() {
     this.renderer.setPixelRatio(this.sharpness);
     this.renderer.setSize(this.place.clientWidth, this.place.clientHeight, false);
+    this.changed();
   }
 
-  /** Turn by dragging, move nearer and away by the wheel. */
+  /** Turn by dragging, move nearer and away by the wheel, which scrolls past a view of a box. */
   drag() {
     const { domElement: canvas } = this.renderer;
     let held = false;
@@ -118,7 +120,9 @@ export class View {
       if (!held) return;
       this.yaw -= 0.008 * event.movementX;
       this.pitch = Math.min(1.5, Math.max(0.02, this.pitch + 0.006 * event.movementY));
+      this.changed();
     });
+    if (this.box) return;
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       this.away = Math.min(4, Math.max(0.25, this.away * Math.exp(0.001 * event.deltaY)));

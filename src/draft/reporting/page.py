@@ -10,9 +10,10 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
+from draft.drawing import inlined, modules
 from draft.explore.comparison_tables import section as comparison_section
 from draft.extras import missing, own_version
-from draft.reporting import dots, motion, plots, scene3d, tables, torque_speed
+from draft.reporting import dots, plots, scene3d, tables, torque_speed
 from draft.reporting.subjects import Subject, comparison, table
 from draft.reporting.tables import Html, text
 from draft.webpage import webpage
@@ -31,9 +32,10 @@ def page(subjects: Sequence[Subject]) -> str:
     library = plotly()
     figures: dict[str, Any] = {}
     compared = comparison(subjects)
+    scene = scene3d.figure(subjects)
     makers = (
-        *(_robots, _overview, partial(_comparison, compared), _masses, _actuators),
-        *(_findings, _metrics, _parameters),
+        *(partial(_robots, scene), _overview, partial(_comparison, compared)),
+        *(_masses, _actuators, _findings, _metrics, _parameters),
     )
     sections = [section for make in makers if (section := make(subjects, figures))]
     title = _title(subjects)
@@ -43,11 +45,16 @@ def page(subjects: Sequence[Subject]) -> str:
             f"<main>{''.join(sections)}</main>",
             _json("draft-report", table(subjects, compared)),
             _json("draft-figures", figures),
+            "" if scene is None else _json("draft-robots", scene),
         ]
     )
-    scripts = ["page.js", *["walk.js"] * ("walk" in figures.get("robots", {}))]
-    scripts = [f"\n{_asset(name)}" for name in scripts]
-    return webpage(title, _asset("page.css"), body, [library, *scripts])
+    scripts = [library, f"\n{_asset('page.js')}"]
+    if scene is None:
+        return webpage(title, _asset("page.css"), body, scripts)
+    drawing = {**modules(), "draft/robots": _asset("robots.js")}
+    drawing = {name: inlined(script) for name, script in drawing.items()}
+    scripts.append('import("draft/robots");')
+    return webpage(title, _asset("page.css"), body, scripts, modules=drawing)
 
 
 def plotly() -> str:
@@ -106,17 +113,21 @@ def _plot(name: str, figure: Any, figures: dict[str, Any], caption: str) -> str:
     )
 
 
-def _robots(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
-    figure = scene3d.figure(subjects)
-    if figure is None:
+def _robots(
+    scene: dict[str, Any] | None, subjects: Sequence[Subject], figures: dict[str, Any]
+) -> str:
+    if scene is None:
         return ""
-    step = figure["floor_step"]
-    what = "Robots" if "walk" in figure else "Home poses"
-    caption = f"{what} at one scale; lines on the floor are {step:g} m apart. Drag to turn."
-    if "walk" in figure:
-        caption += f" Each walks on the spot over marks that are {motion.MARK:g} m apart."
-    plot = _plot("robots", figure, figures, caption)
-    return _section("robots", "Robots", plot, _walks(subjects, "walk" in figure))
+    walking = any(scene3d.walks(subject) for subject in subjects)
+    what = "Robots" if walking else "Home poses"
+    caption = f"{what} at one scale, on squares of {scene['square']:g} m. Drag to turn."
+    if walking:
+        caption += f" Each walks on the spot over marks that are {scene3d.MARK:g} m apart."
+    view = (
+        f'<figure><div id="robots-view" role="img" aria-label="{escape(caption)}"></div>'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
+    return _section("robots", "Robots", view, _walks(subjects, walking))
 
 
 def _walks(subjects: Sequence[Subject], controls: bool) -> str:

@@ -1,99 +1,64 @@
-"""Robots side by side at one scale, as a Plotly scene."""
+"""Robots side by side at one scale, walking on the spot or in their home poses, as plain data.
+
+`robots.js` draws them. Marks on the floor that pass below a robot show its speed.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from html import escape
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from draft.drawing import geoms, packed
 from draft.model import Model
+from draft.model.picture import corners
 from draft.model.scene import home_position
-from draft.model.shapes import shapes
-from draft.model.solids import Triangles, triangles
-from draft.reporting.motion import SEGMENTS, Motion, belt, packed
 from draft.reporting.subjects import Subject
-from draft.spec.primitives import colors
 from draft.values import Array
 
 YAW = 0.75  # of every robot, away from the camera [rad]
-# Width of the panel over its height; a narrower panel shows the scene smaller.
-ASPECT = 2.6
-_GAP = 0.12
-_LINE = 0.17  # height of a line of text over half the height of the panel
-_VIEW = np.array([1.0, 0.0, 0.22])
-_FILLED = 0.92  # share of the panel that the robots fill
-_DISTANCE = 3.0  # of the camera [units of the scene]
+MARK = 0.2  # Distance between two marks on the floor [m].
+_GAP = 0.12  # Room between two robots, per largest side of the first.
+_MARGIN = 0.02  # Room around a gait for the frames between those that are looked at [m].
+_EVERY = 3  # Of these frames one is used to find the room that a gait takes.
+_LINE = 0.35  # Room for a line of text on the floor before the robots, per height of all.
 _STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-# Plotly has no lamps without perspective: the data contain the shade of each vertex.
-_LIGHT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0, "fresnel": 0.0}
-_LAMP = np.array([0.55, -0.35, 0.76])
-_DARK, _BRIGHT = 0.38, 1.12
+_MOST = 32767  # Largest number of 16 bits.
 
 
 def figure(subjects: Sequence[Subject]) -> dict[str, Any] | None:
-    """Return traces, layout and floor step [m] of the scene; None if no design has a model.
+    """Robots, the box that holds them, and the squares' width [m]; None if no design has a model.
 
-    Where designs walk, `walk` has their motion, see `draft.reporting.motion`.
+    Robots are in a row along y, the first at the left of a camera that looks along -x.
     """
-    drawn = [(subject, robot_triangles(subject.model)) for subject in subjects if subject.model]
+    drawn = [(subject, subject.model) for subject in subjects if subject.model is not None]
     if not drawn:
         return None
-    traces: list[dict[str, Any]] = []
-    labels: list[tuple[Subject, Array]] = []
-    corners: list[Array] = []
-    moving: list[dict[str, Any]] = []
+    robots, ends = [], []
     edge = 0.0
-    for subject, parts in drawn:
-        points = np.vstack([part.points for part in parts.values()])
-        low, high = points.min(axis=0), points.max(axis=0)
-        motion = Motion.of(subject, YAW)
-        if motion is not None:
-            low, high = np.minimum(low, motion.low), np.maximum(high, motion.high)
+    for subject, model in drawn:
+        positions, quaternions = _poses(subject, model)
+        low, high = _room(model, positions, quaternions)
         shift = np.array([-(low[0] + high[0]) / 2, edge - low[1], 0.0])
         edge += float(high[1] - low[1]) + _GAP * float(max(high - low))
-        # The floor is the first trace.
-        if motion is not None:
-            traces.append(belt(subject))
-            moving.append(motion.plain(shift, len(traces)))
-        traces += [_mesh(subject, kind, part, shift) for kind, part in parts.items()]
-        labels.append((subject, np.array([high[0], (low[1] + high[1]) / 2, 0.0]) + shift))
-        corners += [low + shift, high + shift]
-    box = np.array([np.min(corners, axis=0), np.max(corners, axis=0)])
+        robots.append(_robot(subject, model, positions + shift, quaternions))
+        robots[-1]["at"] = (shift[:2] + (low + high)[:2] * [0, 0.5]).tolist()
+        robots[-1]["half"] = (0.5 * (high - low)[:2]).tolist()
+        ends += [low + shift, high + shift]
+    box = np.array([np.min(ends, axis=0), np.max(ends, axis=0)])
     box[0, 2] = min(box[0, 2], 0.0)
-    # Labels lie on the floor in front of the robots, which needs room for one line of text.
-    front, room = float(box[1, 0]), _LINE * _unit(box) * float(np.linalg.norm(_VIEW) / _VIEW[2])
-    box[1, 0] += room
-    step = grid_step(float(box[1, 1] - box[0, 1]))
+    front = float(box[1, 0])
+    box[1, 0] += _LINE * float(np.ptp(box[:, 2]))
     return {
-        "data": [_floor(box, step), *traces, _labels(labels, front + room / 2)],
-        "layout": _layout(box, step),
-        "floor_step": step,
-        **({"walk": moving} if moving else {}),
+        "box": box.tolist(),
+        "front": (front + float(box[1, 0])) / 2,
+        "square": square(float(np.ptp(box[:, 1]))),
+        "mark": MARK,
+        "robots": robots,
     }
-
-
-def robot_triangles(model: Model) -> dict[str, Triangles]:
-    """Triangles [m] of a robot in its home pose, turned by `YAW`, by kind of part."""
-    data = home(model)
-    c, s = math.cos(YAW), math.sin(YAW)
-    yaw = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    found: dict[str, list[Triangles]] = {}
-    for i, shape in enumerate(shapes(model.mujoco, model.design)):
-        solid = triangles(shape, model.design, SEGMENTS)
-        if shape.form == "mesh":
-            frame, position = data.xmat[shape.body], data.xpos[shape.body]
-        else:
-            frame, position = data.geom_xmat[i], data.geom_xpos[i]
-        rotation = yaw @ frame.reshape(3, 3)
-        parts = found.setdefault(shape.kind, [])
-        before = sum(len(part.points) for part in parts)
-        points = solid.points @ rotation.T + yaw @ position
-        parts.append(Triangles(points, solid.normals @ rotation.T, solid.faces + before))
-    return {kind: Triangles(*map(np.vstack, zip(*p, strict=True))) for kind, p in found.items()}
 
 
 def home(model: Model) -> mujoco.MjData:
@@ -104,115 +69,73 @@ def home(model: Model) -> mujoco.MjData:
     return data
 
 
-def _mesh(subject: Subject, kind: str, part: Triangles, shift: Array) -> dict[str, Any]:
-    """Mesh of all parts of one kind; the trunk has the colour of the design."""
-    color = [255 * c for c in colors()[kind][:3]]
-    if kind == "trunk":
-        color = [int(subject.color[k : k + 2], 16) for k in (1, 3, 5)]
-    ends = [[min(factor * c, 255.0) for c in color] for factor in (_DARK, _BRIGHT)]
-    scale = [[k, "rgb({:.0f},{:.0f},{:.0f})".format(*end)] for k, end in enumerate(ends)]
-    # Light from a lamp, and from the sky.
-    lamp = np.maximum(part.normals @ (_LAMP / np.linalg.norm(_LAMP)), 0.0)
-    shade = 0.6 * lamp + 0.4 * (0.5 + 0.5 * part.normals[:, 2])
-    moved = part.points + shift
-    return {
-        "type": "mesh3d",
-        "name": escape(subject.title),
-        "hoverinfo": "name",
-        "intensity": packed(shade, "f4"),
-        "colorscale": scale,
-        "cmin": 0,
-        "cmax": 1,
-        "showscale": False,
-        "lighting": _LIGHT,
-        **{axis: packed(moved[:, k], "f4") for k, axis in enumerate("xyz")},
-        **{corner: packed(part.faces[:, k], "i4") for k, corner in enumerate("ijk")},
-    }
-
-
-def grid_step(span: float) -> float:
-    """Distance between the lines on the floor [m], the largest that gives three over the span."""
+def square(span: float) -> float:
+    """Width of the floor's squares [m], the largest of which three fit into a span."""
     return max((step for step in _STEPS if span / step >= 3), default=_STEPS[0])
 
 
-def _floor(box: Array, step: float) -> dict[str, Any]:
-    """Grid on the floor, which reaches beyond the robots on all sides."""
-    low, high = _edges(box, step)
-    x: list[float | None] = []
-    y: list[float | None] = []
-    for at in np.arange(low[0], high[0] + step / 2, step):
-        x += [float(at), float(at), None]
-        y += [float(low[1]), float(high[1]), None]
-    for at in np.arange(low[1], high[1] + step / 2, step):
-        x += [float(low[0]), float(high[0]), None]
-        y += [float(at), float(at), None]
-    lines = {"color": "#c6cdd5", "width": 1.5}
-    z = [None if value is None else 0.0 for value in x]
+def walks(subject: Subject) -> bool:
+    """Whether a design has a recorded gait."""
+    return subject.gait is not None and subject.gait.walks
+
+
+def _poses(subject: Subject, model: Model) -> tuple[Array, Array]:
+    """Positions [m] and orientations of the bodies in all frames, turned by `YAW`."""
+    gait = subject.gait
+    if gait is not None and gait.walks:
+        positions, quaternions = gait.positions, gait.quaternions
+    else:
+        data = home(model)
+        positions, quaternions = data.xpos[None, 1:], data.xquat[None, 1:]
+    c, s = math.cos(0.5 * YAW), math.sin(0.5 * YAW)
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    turned = np.stack((c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w), axis=-1)
+    c, s = math.cos(YAW), math.sin(YAW)
+    return positions @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), turned
+
+
+def _room(model: Model, positions: Array, quaternions: Array) -> tuple[Array, Array]:
+    """Corners of the room that a robot takes in all poses [m], each of shape (3,)."""
+    data = home(model)
+    bodies = np.repeat(model.mujoco.geom_bodyid, 8)  # A box has 8 corners.
+    away = corners(model.mujoco, data) - data.xpos[bodies]
+    points = np.einsum("nji,nj->ni", data.xmat[bodies].reshape(-1, 3, 3), away)
+    found = np.array(list(_extents(points, bodies - 1, positions, quaternions)))
+    margin = _MARGIN if len(positions) > 1 else 0.0
+    return found[:, 0].min(axis=0) - margin, found[:, 1].max(axis=0) + margin
+
+
+def _extents(
+    points: Array, bodies: Array, positions: Array, quaternions: Array
+) -> Iterator[tuple[Array, Array]]:
+    """Least and largest coordinates of points of the bodies, in some of the frames."""
+    turned = np.empty(9)
+    for place, turns in zip(positions[::_EVERY], quaternions[::_EVERY], strict=True):
+        frames = np.empty((len(turns), 3, 3))
+        for body, turn in enumerate(turns):
+            mujoco.mju_quat2Mat(turned, turn.copy())
+            frames[body] = turned.reshape(3, 3)
+        moved = np.einsum("nij,nj->ni", frames[bodies], points) + place[bodies]
+        yield moved.min(axis=0), moved.max(axis=0)
+
+
+def _robot(subject: Subject, model: Model, positions: Array, quaternions: Array) -> dict[str, Any]:
+    """What the page draws of one robot."""
+    quantum = float(np.abs(positions).max()) / _MOST
+    gait = subject.gait
     return {
-        "type": "scatter3d",
-        "mode": "lines",
-        "hoverinfo": "skip",
-        "line": lines,
-        **{"x": x, "y": y, "z": z},
+        "label": f"{subject.title}, {subject.design.mass:.1f} kg",
+        "color": subject.color,
+        "geoms": geoms(model.mujoco),
+        "ahead": [math.cos(YAW), math.sin(YAW)],
+        "frames": len(positions),
+        "bodies": positions.shape[1],
+        "quantum": quantum,
+        "positions": packed(np.rint(positions / quantum), "i2"),
+        "quaternions": packed(np.rint(quaternions * _MOST), "i2"),
+        **(
+            {"period": gait.period, "travel": packed(gait.travel, "f4"), "stride": gait.stride}
+            if gait is not None and gait.walks
+            else {}
+        ),
     }
-
-
-def _edges(box: Array, step: float) -> tuple[Array, Array]:
-    """Corners of the floor, whole steps around the centre of the box, each of shape (2,)."""
-    middle, half = box[:, :2].mean(axis=0), np.ptp(box[:, :2], axis=0) / 2
-    reach = np.ceil(half / step) * step
-    return middle - reach, middle + reach
-
-
-def _labels(places: Sequence[tuple[Subject, Array]], front: float) -> dict[str, Any]:
-    """Title and mass on the floor in front of each robot."""
-    return {
-        "type": "scatter3d",
-        "mode": "text",
-        "hoverinfo": "skip",
-        "x": [front for _ in places],
-        "y": [float(place[1]) for _, place in places],
-        "z": [0.0 for _ in places],
-        "text": [f"{escape(s.title)}, {s.design.mass:.1f} kg" for s, _ in places],
-        "textposition": "middle center",
-        "textfont": {"size": 14, "color": [subject.color for subject, _ in places]},
-    }
-
-
-def _layout(box: Array, step: float) -> dict[str, Any]:
-    """Layout with equal axes, and an orthographic camera that sees the box."""
-    unit = _unit(box)
-    low, high = _edges(box, step)
-    low, high = np.append(low, box[0, 2]), np.append(high, box[1, 2])
-    axis = {"visible": False, "showspikes": False}
-    eye = _DISTANCE * _VIEW / np.linalg.norm(_VIEW)
-    return {
-        "height": 440,
-        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
-        "showlegend": False,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "scene": {
-            **{f"{n}axis": axis | {"range": [low[k], high[k]]} for k, n in enumerate("xyz")},
-            "aspectmode": "manual",
-            "aspectratio": {n: float(high[k] - low[k]) / unit for k, n in enumerate("xyz")},
-            "camera": {
-                "eye": dict(zip("xyz", eye.tolist(), strict=True)),
-                "projection": {"type": "orthographic"},
-            },
-            "dragmode": "orbit",
-        },
-    }
-
-
-def _unit(box: Array) -> float:
-    """Metres per unit of the scene, for a camera that looks at the centre of a box, shape (2, 3).
-
-    An orthographic view of Plotly shows one unit up and down, and ASPECT units to either side.
-    """
-    ahead = -_VIEW / np.linalg.norm(_VIEW)
-    up = np.array([0.0, 0.0, 1.0]) - ahead[2] * ahead
-    up /= np.linalg.norm(up)
-    corners = np.array([(x, y, z) for x in box[:, 0] for y in box[:, 1] for z in box[:, 2]])
-    seen = (corners - box.mean(axis=0)) @ np.array([np.cross(ahead, up), up]).T
-    half = np.abs(seen).max(axis=0)
-    return float(max(half[0] / ASPECT, half[1]) / _FILLED)
