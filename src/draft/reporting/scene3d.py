@@ -11,6 +11,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from draft.drawing import geoms, packed
 from draft.model import Model
@@ -106,7 +107,7 @@ def _room(model: Model, positions: Array, quaternions: Array) -> tuple[Array, Ar
 
 
 def _extents(
-    points: Array, bodies: Array, positions: Array, quaternions: Array
+    points: Array, bodies: NDArray[np.integer], positions: Array, quaternions: Array
 ) -> Iterator[tuple[Array, Array]]:
     """Least and largest coordinates of points of the bodies, in some of the frames."""
     turned = np.empty(9)
