@@ -5,6 +5,7 @@
  * @property {{name: string, unit: string, nodes: number[], value: number}[]} sliders
  * @property {Record<string, number[]>} columns indices of the numbers that vary, by field
  * @property {number} components
+ * @property {{mass: number, inertia: number, length: number}} errors largest between nodes
  * @property {any[]} said what Draft says of each node
  */
 

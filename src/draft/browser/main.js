@@ -87,7 +87,7 @@ class Page {
       slider.dataset.unit = unit;
       $("sliders").append(label);
     }
-    const { errors } = this.bodies?.vary ?? {};
+    const errors = this.bodies?.vary.errors;
     if (errors)
       $("accuracy").textContent = `Between the bodies that Draft compiled, masses are within ${(100 * errors.mass).toFixed(1)} %, ` +
         `inertias ${(100 * errors.inertia).toFixed(1)} %, lengths ${(1000 * errors.length).toFixed(2)} mm of its own.`;

@@ -8,7 +8,6 @@ const DOWN = 1.0; // Time that a fallen robot lies before it starts again [s].
 const START = /** @type {Record<string, number>} */ ({
   geom_size: 3, geom_pos: 3, geom_quat: 4, geom_rbound: 1, geom_aabb: 6,
 });
-const VIEWS = ["qpos", "qvel", "qfrc_applied", "sensordata", "xmat", "xpos", "xquat"];
 
 /**
  * @typedef {object} Policy numbers of `draft.learn.policy.policy.Policy`, joints in its order
@@ -75,7 +74,14 @@ export class Robot {
 
   /** Take the arrays of the state anew. */
   grab() {
-    for (const name of VIEWS) this[name] = this.data[name];
+    const { data } = this;
+    this.qpos = data.qpos;
+    this.qvel = data.qvel;
+    this.qfrc_applied = data.qfrc_applied;
+    this.sensordata = data.sensordata;
+    this.xmat = data.xmat;
+    this.xpos = data.xpos;
+    this.xquat = data.xquat;
   }
 
   /** Take them anew if the memory of MuJoCo has grown, as with another robot: it detaches them. */
@@ -86,12 +92,13 @@ export class Robot {
   /**
    * Let the body be replaced: what a model remembers of equal frames need not hold for others.
    * Vertices of the trunk then are in the frame of its body.
+   * @returns {Float64Array} inertias of the bodies
    */
   loosen() {
     const { model } = this;
     for (const kind of ["body", "geom", "site"]) model[`${kind}_sameframe`].fill(0);
     model.opt.disableflags |= this.mujoco.mjtDisableBit.mjDSBL_MIDPHASE.value; // Its boxes turn.
-    this.tensors = tensors(model.body_inertia, model.body_iquat);
+    const found = this.tensors = tensors(model.body_inertia, model.body_iquat);
     for (let geom = 0; geom < model.ngeom; geom++) {
       if (model.geom_type[geom] !== this.mujoco.mjtGeom.mjGEOM_MESH.value) continue;
       const mesh = model.geom_dataid[geom], start = model.mesh_vertadr[mesh];
@@ -107,6 +114,7 @@ export class Robot {
       model.geom_pos.set([0, 0, 0], 3 * geom);
       model.geom_quat.set([1, 0, 0, 0], 4 * geom);
     }
+    return found;
   }
 
   /**
@@ -117,17 +125,17 @@ export class Robot {
    */
   setBody(columns, places) {
     const { mujoco, model, data } = this;
-    if (!this.tensors) this.loosen();
+    const turned = this.tensors ?? this.loosen();
     mujoco.mj_fwdPosition(model, data);
     const depth = this.depth(), numbers = { ...this.numbers };
     for (const [name, values] of Object.entries(columns)) {
       const put = (/** @type {any} */ to, start = 0) => places[name].forEach((at, i) => { to[start + at] = values[i]; });
       if (name.startsWith("number ")) put((numbers[name.slice(7)] = [...numbers[name.slice(7)]]));
       else if (name === "network") this.network?.put(places[name], values);
-      else if (name === "body_tensor") put(this.tensors);
+      else if (name === "body_tensor") put(turned);
       else put(model[name], START[name] ?? 0);
     }
-    principal(this.tensors, model.body_inertia, model.body_iquat);
+    principal(turned, model.body_inertia, model.body_iquat);
     for (const name of ["body_quat", "geom_quat"]) if (name in columns) unit(model[name]);
     const state = { qpos: data.qpos.slice(), qvel: data.qvel.slice(), time: data.time };
     mujoco.mj_setConst(model, data);
