@@ -46,6 +46,26 @@ def tensors(model: Any) -> np.ndarray:
 
 
 @pytest.mark.slow
+def test_a_slider_moves_all_robots_by_factors_of_their_own_numbers(
+    tmp_path: Path, opened: Opened
+) -> None:
+    page(["cheetah", "giraffe"], tmp_path / "page", vary=["thigh_length=*0.9:*1.1"])
+    tab = opened(tmp_path / "page", "#slow=0")
+    tab.evaluate(
+        "() => { draftPage.shaped[0].value = draftPage.shaped[0].max; draftPage.reshape(); }"
+    )
+    for i, name in enumerate(("cheetah", "giraffe")):
+        tab.evaluate(f"draftPage.choose({i})")
+        design = open_design(name)
+        own = design.spec.resolve(dict(design.values), {"thigh_length": "*1.1"})
+        shown = tab.inner_text("#sliders output")
+        assert shown == f"{own.parameters['thigh_length']:.3g} m"
+        masses = tab.evaluate(f"[...draftPage.robots[{i}].model.body_mass].reduce((a, b) => a + b)")
+        assert masses == pytest.approx(own.mass, rel=grid.BARS["mass"])
+    assert tab.faults == []
+
+
+@pytest.mark.slow
 def test_bodies_of_the_sliders_are_those_that_draft_compiles(
     tmp_path: Path, opened: Opened
 ) -> None:
@@ -146,7 +166,7 @@ def test_texts_of_users_cannot_leave_their_place(tmp_path: Path) -> None:
     )
     from draft.browser.page import _contents
 
-    text = _contents([made], None, single=False)["index.html"]
+    text = _contents([made], [], single=False)["index.html"]
     assert isinstance(text, str)
     assert "<img" not in text
     assert "\\u003cimg" in text
@@ -158,7 +178,8 @@ def test_texts_of_users_cannot_leave_their_place(tmp_path: Path) -> None:
         ([], {}, "a page shows 1 to 6 designs, not 0"),
         (["cheetah"] * 7, {}, "a page shows 1 to 6 designs, not 7"),
         (["cheetah"], {"skill": "climb"}, "a page shows no skill 'climb'"),
-        (["cheetah", "bear"], {"vary": RANGES}, "`vary` varies one design, but 2 are named"),
+        (["cheetah"], {"vary": ["thigh=*0.8:*1.2"]}, "thigh of quadruped is no number that it"),
+        (["cheetah"], {"vary": ["thigh_length=*.:*1"]}, "'*.' is not a number"),
         (["cheetah"], {"vary": ["thigh_length=0.2,0.3"]}, "lists values, and a slider has a range"),
         (["cheetah"], {"vary": ["thigh=0.2:0.3"]}, "'thigh' is not a parameter"),
     ],

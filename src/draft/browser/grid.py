@@ -10,7 +10,8 @@ its body.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from draft.browser.robots import Driven, body_numbers, driven, network_numbers, said
 from draft.design import Design
-from draft.errors import DraftError
+from draft.errors import DraftError, quoted
 from draft.explore.sensitivity import stated_numbers
 from draft.learn.policy.reduced import AnyPolicy
 from draft.learn.policy.validity import Fit
@@ -38,6 +39,7 @@ BARS = {"mass": 0.005, "inertia": 0.02, "length": 1e-4}
 _AIM = 0.8  # Share of the bars that halfway between two nodes may reach, to begin with.
 _MOST_NODES = 4096
 _ROUNDS = 16
+_FACTORS = re.compile(r"\* *(\d*\.?\d+) *: *\* *(\d*\.?\d+)")
 _KINDS = {
     **dict.fromkeys(("body_pos", "body_ipos", "geom_pos", "geom_size"), "length"),
     **dict.fromkeys(("site_pos", "mesh_vert", "qpos0"), "length"),
@@ -70,7 +72,8 @@ def grid(model: Model, vary: Vary, skill: str, policies: Sequence[AnyPolicy]) ->
 
     Args:
         model: the design's model; its other numbers stay as they are.
-        vary: ranges of up to 5 numbers, see `draft.variation.axes.parse`.
+        vary: ranges of up to 5 numbers, see `draft.variation.axes.parse`; a word such as
+            "thigh_length=*0.8:*1.2" is about the design's own number.
         skill: what the policy can do, see `draft.browser.robots.driven`.
         policies: see there.
 
@@ -79,7 +82,7 @@ def grid(model: Model, vary: Vary, skill: str, policies: Sequence[AnyPolicy]) ->
             size keeps to the errors of `BARS`.
     """
     design = model.design
-    axes = parse(design.spec, vary)
+    axes = parse(design.spec, _own_ranges(design, vary))
     _check(axes)
     space = _Space(model, axes)
     nodes, table, errors = _refined(space)
@@ -115,6 +118,23 @@ def grid(model: Model, vary: Vary, skill: str, policies: Sequence[AnyPolicy]) ->
     }
     numbers = np.concatenate((mean, parts.ravel(), shares.ravel()))
     return Grid(by, plain, numbers.astype(np.float32))
+
+
+def _own_ranges(design: Design, vary: Vary) -> Vary:
+    """Ranges, in which factors of the design's own numbers have become numbers."""
+    if isinstance(vary, Mapping):
+        return vary
+    own = stated_numbers(design)
+    found = []
+    for word in [vary] if isinstance(vary, str) else vary:
+        name, _, text = map(str.strip, str(word).partition("="))
+        factors = _FACTORS.fullmatch(text)
+        if factors and name not in own:
+            cause = f"`vary` '{word}': {name} of {design.name} is no number that it states"
+            raise DraftError(cause, f"give a plain range, or vary one of {quoted(own)}")
+        ends = [own[name] * float(factor) for factor in factors.groups()] if factors else []
+        found.append(f"{name}={ends[0]!r}:{ends[1]!r}" if ends else word)
+    return found
 
 
 def _check(axes: Sequence[Axis]) -> None:

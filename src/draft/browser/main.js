@@ -30,7 +30,7 @@ class Page {
   /**
    * @param {any} mujoco
    * @param {(Network | null)[]} networks
-   * @param {Bodies | null} bodies of the one robot whose body varies
+   * @param {Bodies[]} bodies of the robots, empty if none varies
    */
   constructor(mujoco, networks, bodies) {
     this.bodies = bodies;
@@ -74,44 +74,53 @@ class Page {
     $("steering").hidden = this.robots.every((/** @type {Robot} */ one) => !one.policy);
   }
 
-  /** Sliders of the body. */
+  /** Sliders of the bodies, in the numbers of the first robot; another is at the same share of its own range. */
   shapes() {
-    $("body").hidden = !this.bodies;
-    for (const { name, unit, nodes, value } of this.bodies?.vary.sliders ?? []) {
-      const label = element("label", name.split(".").at(-1)?.replaceAll("_", " ") ?? name), shown = element("output", "");
+    $("body").hidden = !this.bodies.length;
+    for (const { name, nodes, value } of this.bodies[0]?.vary.sliders ?? []) {
+      const label = element("label", name.split(".").at(-1)?.replaceAll("_", " ") ?? name);
       const slider = document.createElement("input");
       Object.assign(slider, { type: "range", id: name, min: nodes[0], max: nodes.at(-1), step: "any", value });
       label.title = name;
-      label.append(" ", shown, slider);
+      label.append(" ", element("output", ""), slider);
       slider.addEventListener("input", () => this.reshape());
-      slider.dataset.unit = unit;
       $("sliders").append(label);
     }
-    const errors = this.bodies?.vary.errors;
-    if (errors)
-      $("accuracy").textContent = `Between the bodies that Draft compiled, masses are within ${(100 * errors.mass).toFixed(1)} %, ` +
-        `inertias ${(100 * errors.inertia).toFixed(1)} %, lengths ${(1000 * errors.length).toFixed(2)} mm of its own.`;
+    const worst = (/** @type {"mass" | "inertia" | "length"} */ kind) => Math.max(...this.bodies.map(({ vary }) => vary.errors[kind]));
+    if (this.bodies.length)
+      $("accuracy").textContent = `Between the bodies that Draft compiled, masses are within ${(100 * worst("mass")).toFixed(1)} %, ` +
+        `inertias ${(100 * worst("inertia")).toFixed(1)} %, lengths ${(1000 * worst("length")).toFixed(2)} mm of its own.`;
   }
 
-  /** Sliders of the body, by name. */
+  /** Sliders of the bodies. */
   get shaped() {
     return /** @type {HTMLInputElement[]} */ ([...$("sliders").querySelectorAll("input")]);
   }
 
-  /** Give the robot the body of the sliders. */
+  /**
+   * Values of a robot's numbers.
+   * @param {number} index of the robot
+   */
+  values(index) {
+    return this.shaped.map((slider, i) => {
+      const { nodes } = this.bodies[index].vary.sliders[i], end = /** @type {number} */ (nodes.at(-1));
+      const share = (Number(slider.value) - Number(slider.min)) / (Number(slider.max) - Number(slider.min));
+      return index ? nodes[0] + share * (end - nodes[0]) : Number(slider.value);
+    });
+  }
+
+  /** Give the robots the bodies of the sliders. */
   reshape() {
-    if (!this.bodies) return;
-    const begun = performance.now(), sliders = this.shaped, [robot] = this.robots;
-    const { columns, said, between } = this.bodies.at(sliders.map((slider) => Number(slider.value)));
-    robot.setBody(columns, this.bodies.vary.columns);
-    page.robots[0].said = said;
-    for (const slider of sliders) {
-      const shown = slider.parentElement?.querySelector("output");
-      if (shown) shown.textContent = `${Number(slider.value).toPrecision(3)} ${slider.dataset.unit}`;
-    }
-    this.picture.figures[0].shape();
-    this.choose(0);
-    if (between) $("verdict").textContent = `Between nodes; the nearest one: ${$("verdict").textContent}`;
+    if (!this.bodies.length) return;
+    const begun = performance.now();
+    this.bodies.forEach((bodies, i) => {
+      const { columns, said, between } = bodies.at(this.values(i));
+      this.robots[i].setBody(columns, bodies.vary.columns);
+      Object.assign(page.robots[i], { said, between });
+      this.picture.figures[i].shape();
+    });
+    for (const robot of this.robots) robot.refresh();
+    this.choose(this.shown);
     this.steer();
     this.count.reshaped = performance.now() - begun; // [ms]
   }
@@ -156,7 +165,7 @@ class Page {
     const known = new Set([...Object.keys(usual), ...this.shaped.map((slider) => slider.id)]);
     for (const name of given.keys()) if (name && !known.has(name)) said.push(`there is no ${name}`);
     if (said.length) $("note").textContent = `Of the link: ${said.join("; ")}.`;
-    if (this.bodies) this.reshape();
+    if (this.bodies.length) this.reshape();
     else this.steer();
   }
 
@@ -172,6 +181,10 @@ class Page {
     this.shown = index;
     this.limits.clear();
     const one = page.robots[index], { said } = one, { model } = this.robots[index];
+    this.shaped.forEach((slider, i) => {
+      const shown = slider.parentElement?.querySelector("output"), { unit } = this.bodies[index].vary.sliders[i];
+      if (shown) shown.textContent = `${this.values(index)[i].toPrecision(3)} ${unit}`;
+    });
     [...$("robots").children].forEach((tab, i) => tab.classList.toggle("chosen", i === index));
     $("name").textContent = one.title;
     const masses = Object.entries(one.bodies).map(([name, id]) => /** @type {const} */ ([name, model.body_mass[id]]));
@@ -182,7 +195,7 @@ class Page {
       row.append(element("b", id.replaceAll("_", " ")), ` ${text}`);
       return row;
     }));
-    $("verdict").textContent = said.accepted ? (said.findings.length ? "It could be built." : "It could be built; no findings.") : "It could not be built:";
+    $("verdict").textContent = (one.between ? "Between nodes; the nearest one: " : "") + (said.accepted ? (said.findings.length ? "It could be built." : "It could be built; no findings.") : "It could not be built:");
     $("masses").replaceChildren(...masses.map(([name, mass]) => {
       const row = document.createElement("tr");
       row.append(element("th", name.replaceAll("_", " ")), element("td", `${mass.toFixed(3)} kg`));
@@ -251,7 +264,8 @@ async function start() {
   const numbers = new Map(names.map((name, i) => [name, new Float32Array(rows[i])]));
   const networks = page.robots.map((/** @type {any} */ one) =>
     one.policy ? Network.read(/** @type {Float32Array} */ (numbers.get(one.network)), one.policy.sizes) : null);
-  const bodies = page.vary ? new Bodies(page.vary, new Float32Array(await part("bodies"))) : null;
+  const bodies = await Promise.all(page.vary.map(async (/** @type {any} */ vary, /** @type {number} */ i) =>
+    new Bodies(vary, new Float32Array(await part(`bodies-${i}`)))));
   $("note").textContent = "";
   Object.assign(window, { draftPage: new Page(mujoco, networks, bodies) }); // For tests and measurements.
 }

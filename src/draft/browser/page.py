@@ -54,8 +54,9 @@ def page(
         skill: what the shipped policies can do: "walk", "run" or "push".
         single: whether to write one file that opens from the disk, without a server or a network.
         policies: ONNX files of policies to walk with before those that ship.
-        vary: ranges of up to 5 numbers of one design, which become sliders: words such as
-            "thigh_length=0.2:0.3", or (low, high) by name.
+        vary: ranges of up to 5 numbers of the designs, which become sliders: words such as
+            "thigh_length=0.2:0.3" or "thigh_length=*0.8:*1.2", factors of each design's own number,
+            or (low, high) by name. A slider moves all designs.
 
     Returns:
         The files written, the page first.
@@ -71,19 +72,13 @@ def page(
         raise DraftError(cause, f"skills: {', '.join(SKILLS)}")
     engine()
     opened = open_designs(given)
-    _check(opened, bool(len(vary)))
+    _check(opened)
     own = [open_any(file) for file in policies]
     models = [compiled(design) for design in opened]
-    varied = grid(models[0], vary, skill, own) if len(vary) else None
-    robots = [
-        robot(
-            model,
-            title,
-            COLORS[i % len(COLORS)],
-            driven([model], skill, own) if varied is None else varied.by,
-        )
-        for i, (model, title) in enumerate(zip(models, titles(opened), strict=True))
-    ]
+    varied = [grid(model, vary, skill, own) for model in models] if len(vary) else []
+    by = [one.by for one in varied] or [driven([model], skill, own) for model in models]
+    rows = zip(models, titles(opened), COLORS, by, strict=False)  # There are more colours.
+    robots = [robot(*row) for row in rows]
     contents = _contents(robots, varied, single)
     target = Path(out if out is not None else "page.html" if single else "page")
     if single:
@@ -96,10 +91,7 @@ def page(
     return [target / name for name in contents]
 
 
-def _check(designs: Sequence[Design], varied: bool) -> None:
-    if varied and len(designs) != 1:
-        cause = f"`vary` varies one design, but {len(designs)} are named"
-        raise DraftError(cause, "name one")
+def _check(designs: Sequence[Design]) -> None:
     if not 1 <= len(designs) <= MOST:
         cause = f"a page shows 1 to {MOST} designs, not {len(designs)}"
         raise DraftError(cause, "name fewer, or write several pages")
@@ -117,7 +109,7 @@ def _check_folder(folder: Path) -> None:
 
 
 def _contents(
-    robots: Sequence[PageRobot], varied: Grid | None, single: bool
+    robots: Sequence[PageRobot], varied: Sequence[Grid], single: bool
 ) -> dict[str, str | bytes]:
     """Contents of the files by name, the page first."""
     modules = _modules()
@@ -131,10 +123,10 @@ def _contents(
             parts.setdefault(name, gzip.compress(numbers, 6, mtime=0))
             record["network"] = name
         plain.append(record)
-    if varied is not None:
-        parts["bodies"] = gzip.compress(varied.numbers.astype("<f4").tobytes(), 6, mtime=0)
+    for i, one in enumerate(varied):
+        parts[f"bodies-{i}"] = gzip.compress(one.numbers.astype("<f4").tobytes(), 6, mtime=0)
     data = {
-        "vary": None if varied is None else varied.plain,
+        "vary": [one.plain for one in varied],
         "mujoco": engine().version,
         "lanes": _lanes(robots),
         "robots": plain,

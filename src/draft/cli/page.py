@@ -20,8 +20,8 @@ def main(
         tuple[str, ...],
         tyro.conf.arg(
             metavar="NAME=LOW:HIGH ...",
-            help="Ranges of up to 5 numbers of one design, which become sliders: "
-            "thigh_length=0.2:0.3 actuators.leg.peak_torque=60:120.",
+            help="Ranges of up to 5 numbers, which become sliders: thigh_length=0.2:0.3, or "
+            "'thigh_length=*0.8:*1.2' for factors of each design's own number.",
             help_behavior_hint="(default: none)",
         ),
     ] = (),
@@ -45,8 +45,8 @@ def main(
     """Write a web page in which designs walk side by side under live physics.
 
     Whoever opens it steers and pushes them, and sees masses, findings and the loads of their
-    motors. With --vary, sliders change the body of one design while it walks. A design that no
-    policy drives stands, and the page says why.
+    motors. With --vary, sliders change their bodies while they walk. A design that no policy
+    drives stands, and the page says why.
     """
     start = time.perf_counter()
     from draft.browser.page import page
