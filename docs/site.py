@@ -19,10 +19,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     from sphinx.cmd.build import build_main
 
+    from docs import live
+
     fresh = ["--fresh-env", "--write-all"] if options.fresh else []
     command = ["-b", "html", "-q", "--fail-on-warning", *fresh, str(DOCS), str(options.out)]
     failed = build_main(command)
     if not failed:
+        if live.available():
+            live.write(options.out / "live")
+        else:
+            print("no robots walk in it: that needs the extra `page`")
         print(f"open {options.out / 'index.html'}")
     return int(bool(failed))
 

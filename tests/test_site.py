@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 import yaml
 
-from docs import blocks, generated_pages
+import draft
+from docs import blocks, generated_pages, live
 from draft.cli import COMMANDS, functions
 from draft.metrics import METRICS
 from draft.metrics.capabilities import CAPABILITIES
@@ -51,6 +52,7 @@ NEEDS = {
 # Packages that a page says how to install.
 ALSO = {"howto/ros": ("pin",)}
 EXAMPLES = generated_pages.examples()
+MAKERS = {"unitree": "Unitree", "deeprobotics": "DeepRobotics"}
 
 
 def _python(*words: str, folder: Path) -> str:
@@ -179,6 +181,28 @@ def test_the_site_opens_without_a_network(site: Path) -> None:
     assert (site / "search.html").is_file()
     front = (site / "index.html").read_text(encoding="utf-8")
     assert "pip install uv" in re.sub(r"<[^>]+>", "", front)
+
+
+@pytest.mark.slow
+def test_the_front_of_the_site_is_a_page_in_which_robots_walk(site: Path, browser: Any) -> None:
+    pytest.importorskip("mjswan", reason="needs the extra page")
+    links = re.findall(r'(?:src|href)="(live/\w+.html)"', (DOCS / "live.md").read_text())
+    assert {*links} == {f"live/{path.name}" for path in (site / "live").iterdir()}
+    page = browser.new_context().new_page()
+    page.goto((site / "index.html").as_uri())
+    (live,) = (one for one in page.frames if "quadrupeds" in one.url)
+    live.wait_for_function("window.draftPage && draftPage.robots.every(one => one.qpos[0] > 0.2)")
+    page.context.close()
+
+
+@pytest.mark.parametrize("name", live.REAL)
+def test_the_gallery_states_the_masses_of_real_robots(name: str, tmp_path: Path) -> None:
+    (description,) = (live.DESCRIPTIONS / name).glob("*.urdf")
+    found = draft.import_robot(description, tmp_path / name)
+    own = sum(float(mass) for mass in re.findall(r'<mass value="([^"]+)"', description.read_text()))
+    maker, _, model = name.partition("_")
+    row = f"| {MAKERS[maker]} {model.title()} | {found.spec.resolve().mass:.1f} | {own:.1f} |"
+    assert row in (DOCS / "live.md").read_text(encoding="utf-8")
 
 
 def test_sample_outputs_have_no_gaps() -> None:

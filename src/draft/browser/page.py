@@ -55,7 +55,7 @@ def page(
         single: whether to write one file that opens from the disk, without a server or a network.
         policies: ONNX files of policies to walk with before those that ship.
         vary: ranges of up to 5 numbers of the designs, which become sliders: words such as
-            "thigh_length=0.2:0.3" or "thigh_length=*0.8:*1.2", factors of each design's own number,
+            "thigh_length=0.2:0.3" or `thigh_length=*0.8:*1.2`, factors of each design's own number,
             or (low, high) by name. A slider moves all designs.
 
     Returns:

@@ -26,8 +26,8 @@ export class Picture extends View {
     this.figures = robots.map((robot, i) => new Figure(this.scene, robot.model, colors[i], robot.trunk));
     this.figures.forEach((one, i) => { one.group.position.y = lanes[i]; });
     Object.assign(this, { robots, lanes });
-    this.yaw = robots.length > 1 ? -0.55 : -1.15; // Those abreast are seen from ahead.
-    this.size = Math.max(...robots.map((robot) => robot.size), (Math.max(...lanes) - Math.min(...lanes)) * 0.75);
+    this.yaw = robots.length > 1 ? 0.55 : -1.15; // Those abreast are seen from ahead, the first one nearest.
+    this.size = Math.max(...robots.map((robot) => robot.size), (Math.max(...lanes) - Math.min(...lanes)) * 0.62);
     this.fade(12 * this.size, 45 * this.size);
     this.follow(true);
   }

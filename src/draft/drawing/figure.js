@@ -2,7 +2,7 @@
 import * as THREE from "three";
 
 export const SUN = new THREE.Vector3(0.35, -0.45, 1);
-const SHADE = new THREE.MeshBasicMaterial({ color: 0xa9b2ba });
+const SHADE = new THREE.MeshBasicMaterial({ color: 0xa9b2ba, depthWrite: false });
 const SKIN = new THREE.MeshLambertMaterial({ vertexColors: true });
 const SPHERE = 2, CYLINDER = 5, BOX = 6, MESH = 7; // of mjtGeom
 const UNIT = /** @type {Record<number, THREE.BufferGeometry>} */ ({
@@ -11,9 +11,9 @@ const UNIT = /** @type {Record<number, THREE.BufferGeometry>} */ ({
   [BOX]: new THREE.BoxGeometry(2, 2, 2),
 });
 for (const type in UNIT) UNIT[type] = UNIT[type].toNonIndexed();
-// Projection along the sun's rays on the ground, a little above it.
+// Projection along the sun's rays on the ground.
 const FLAT = new THREE.Matrix4().set(
-  1, 0, -SUN.x / SUN.z, 0, 0, 1, -SUN.y / SUN.z, 0, 0, 0, 0, 0.002, 0, 0, 0, 1);
+  1, 0, -SUN.x / SUN.z, 0, 0, 1, -SUN.y / SUN.z, 0, 0, 0, 0, 0, 0, 0, 0, 1);
 
 /**
  * @typedef {object} Geoms geoms and meshes by the names of MjModel, see `draft.drawing.geoms`
@@ -55,6 +55,7 @@ export class Figure {
         const mesh = new THREE.Mesh(shape, SKIN), shadow = new THREE.Mesh(shape, SHADE);
         mesh.matrixAutoUpdate = shadow.matrixAutoUpdate = false;
         mesh.frustumCulled = shadow.frustumCulled = false;
+        shadow.renderOrder = -0.5; // Above the ground, below all else.
         this.group.add(mesh, shadow);
         this.parts.set(body, { geoms: [], mesh, shadow });
       }

@@ -149,6 +149,7 @@ function ground(square, box) {
   const size = box?.getSize(new THREE.Vector3()), tile = 2 * square;
   const [wide, deep] = size ? [size.x, size.y].map((one) => tile * Math.ceil(one / tile)) : [FAR, FAR];
   const material = new THREE.ShaderMaterial({
+    depthWrite: false, // Shadows lie too close to it to be sorted by depth: it is drawn first.
     uniforms: {
       square: { value: square }, sky: { value: tint(SKY) }, light: { value: tint(LIGHT) }, dark: { value: tint(DARK) },
       near: { value: 1e6 }, far: { value: 2e6 }, // of the fog [m]
@@ -169,6 +170,7 @@ function ground(square, box) {
       }`,
   });
   const mesh = new THREE.Mesh(new THREE.PlaneGeometry(wide, deep), material);
+  mesh.renderOrder = -1;
   const middle = box?.getCenter(new THREE.Vector3());
   if (middle) mesh.position.set(middle.x, middle.y, 0);
   return mesh;

@@ -1,0 +1,68 @@
+"""Robots that walk in the site: pages of `draft page` for its front and for its gallery.
+
+python -m docs.live --out build/live  # the pages alone; `docs.site` writes them into the site
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import draft
+
+DOCS = Path(__file__).resolve().parent
+DESCRIPTIONS = DOCS.parent / "examples" / "descriptions"
+OUT = DOCS.parent / "build" / "live"
+REAL = ("unitree_go2", "unitree_a1", "unitree_aliengo", "unitree_b2", "deeprobotics_x30")
+PAGES: dict[str, dict[str, Any]] = {
+    "quadrupeds": {
+        "designs": ["cheetah", "bear", "giraffe"],
+        "vary": [
+            "thigh_length=*0.9:*1.1",
+            "shank_length=*0.9:*1.1",
+            "actuators.leg.peak_torque=*0.8:*1.3",
+        ],
+    },
+    "legs": {"designs": ["hexapod", "biped", "humanoid", "hopper"]},
+    "others": {"designs": ["wheeled", "arm", "hand"]},
+}
+
+
+def write(out: Path) -> list[Path]:
+    """Write all pages, each one file, which opens from the disk too.
+
+    Raises:
+        DraftError: the extra `page` is not installed.
+    """
+    written = []
+    for name, options in PAGES.items():
+        written += draft.page(out=out / f"{name}.html", single=True, **options)
+    with tempfile.TemporaryDirectory() as folder:
+        designs = []
+        for name in REAL:
+            (description,) = (DESCRIPTIONS / name).glob("*.urdf")
+            imported = draft.import_robot(description, Path(folder) / name)
+            designs.append(imported.spec)
+        written += draft.page(designs, out / "real.html", single=True)
+    return written
+
+
+def available() -> bool:
+    """Whether the extra of pages is installed."""
+    return find_spec("mjswan") is not None
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the pages and print their names."""
+    parser = argparse.ArgumentParser(prog="python -m docs.live", description=write.__doc__)
+    parser.add_argument("--out", type=Path, default=OUT, help="folder of the pages")
+    for path in write(parser.parse_args(arguments).out):
+        print(path)
+
+
+if __name__ == "__main__":
+    main()
