@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -49,11 +48,6 @@ def write(out: Path) -> list[Path]:
             designs.append(imported.spec)
         written += draft.page(designs, out / "real.html", single=True)
     return written
-
-
-def available() -> bool:
-    """Whether the extra of pages is installed."""
-    return find_spec("mjswan") is not None
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

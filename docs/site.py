@@ -20,12 +20,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from sphinx.cmd.build import build_main
 
     from docs import live
+    from draft.browser.engine import available
 
     fresh = ["--fresh-env", "--write-all"] if options.fresh else []
     command = ["-b", "html", "-q", "--fail-on-warning", *fresh, str(DOCS), str(options.out)]
     failed = build_main(command)
     if not failed:
-        if live.available():
+        if available():
             live.write(options.out / "live")
         else:
             print("no robots walk in it: that needs the extra `page`")

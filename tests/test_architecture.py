@@ -55,10 +55,10 @@ BELOW: dict[str, set[str]] = {
     "variation": {"laws", "spec"},
     "learn": {"laws", "spec", "design", "model", "metrics", "variation", "serving"},
     "explore": {"laws", "spec", "design", "model", "metrics", "variation", "learn"},
-    "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"},
-    "browser": {
-        *("laws", "spec", "design", "model", "metrics", "variation", "explore", "learn"),
-        "reporting",
+    "browser": {"laws", "spec", "design", "model", "metrics", "variation", "explore", "learn"},
+    "reporting": {
+        *("laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"),
+        "browser",
     },
     "studio": {
         *("laws", "spec", "design", "model", "metrics", "explore", "learn"),

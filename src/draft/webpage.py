@@ -23,6 +23,7 @@ def webpage(
     requests: bool = False,
     modules: Mapping[str, str] | None = None,
     compiles: bool = False,
+    frames: bool = False,
 ) -> str:
     """Text of an HTML page whose content policy forbids a browser to load anything else.
 
@@ -34,10 +35,11 @@ def webpage(
         requests: whether scripts may send requests to the server of the page.
         modules: address of each module by the name that `import` gives it; None without modules.
         compiles: whether modules may compile WebAssembly.
+        frames: whether the body has pages with such modules, which its policy holds for too.
     """
     policy = _POLICY + (_SCRIPTS if scripts else _PICTURES)
-    policy = policy if modules is None else policy.replace("script-src", _MODULES)
-    policy = policy.replace("script-src", _COMPILES) if compiles else policy
+    policy = policy.replace("script-src", _MODULES) if modules is not None or frames else policy
+    policy = policy.replace("script-src", _COMPILES) if compiles or frames else policy
     policy += "; connect-src 'self'" if requests else ""
     return "\n".join(
         [

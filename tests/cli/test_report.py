@@ -24,10 +24,17 @@ def test_a_page_is_written_and_named(command: Command) -> None:
     assert table["out"] == ["report.html"]
 
 
-def test_robots_walk_on_request(command: Command) -> None:
+@pytest.mark.parametrize("live", [False, True])
+def test_robots_walk_on_request(
+    live: bool, monkeypatch: pytest.MonkeyPatch, command: Command
+) -> None:
+    if live:
+        pytest.importorskip("mjswan", reason="needs the extra page")
+    else:
+        monkeypatch.setattr("draft.reporting.subjects.available", lambda: False)
     command("report cheetah hopper --walk")
     text = Path("report.html").read_text(encoding="utf-8")
-    assert 'id="walk-play"' in text
+    assert ('class="live"' if live else 'id="walk-play"') in text
     assert "stands: no policy drives the joints of hopper" in text
 
 

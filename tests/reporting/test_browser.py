@@ -120,7 +120,23 @@ def lowest_foot(found: list[Subject], time: float) -> float:
     return float(min(heights))
 
 
-def test_the_robots_walk_until_they_are_paused(opened: Callable[[list[Subject]], Any]) -> None:
+@pytest.mark.slow
+def test_robots_walk_under_live_physics_where_the_extra_is(
+    opened: Callable[[list[Subject]], Any],
+) -> None:
+    pytest.importorskip("mjswan", reason="needs the extra page")
+    tab = opened(subjects(open_designs(["cheetah", "hopper"]), walk=True))
+    live = tab.frames[1]
+    live.wait_for_function("window.draftPage && draftPage.robots[0].qpos[0] > 0.2")
+    assert "It stands: no policy drives" in live.evaluate(
+        "() => { draftPage.choose(1); return document.getElementById('why').textContent; }"
+    )
+
+
+def test_the_robots_walk_until_they_are_paused(
+    monkeypatch: pytest.MonkeyPatch, opened: Callable[[list[Subject]], Any]
+) -> None:
+    monkeypatch.setattr("draft.reporting.subjects.available", lambda: False)
     found = subjects(open_designs(["cheetah", "bear", "giraffe"]), walk=True)
     tab = opened(found)
     tab.wait_for_function("window.draftRobots")

@@ -26,7 +26,10 @@ KINDS = {"f4": "<f4", "i2": "<i2"}
 
 @pytest.fixture(scope="module")
 def walking() -> list[Subject]:
-    return subjects(open_designs(DESIGNS), walk=True)
+    """Recorded gaits, as without the extra of live pages."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("draft.reporting.subjects.available", lambda: False)
+        return subjects(open_designs(DESIGNS), walk=True)
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +98,8 @@ def test_the_scene_has_room_for_the_whole_gait(walking: list[Subject], text: str
             assert high[2] >= corners(model, data)[:, 2].max() - 1e-6
 
 
-def test_a_report_in_which_all_stand_has_no_controls() -> None:
+def test_a_report_in_which_all_stand_has_no_controls(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("draft.reporting.subjects.available", lambda: False)
     text = page(subjects(open_designs(["hopper"]), walk=True))
     assert "stands: no policy drives the joints of hopper" in text
     assert 'id="walk-play"' not in text

@@ -62,3 +62,12 @@ def engine() -> Engine:
             version, _RUNTIME.sub("const e = null;", text), (assets / wasm[0]).read_bytes()
         )
     raise DraftError(f"{assets} holds no MuJoCo that a page can load", "install mjswan 0.12.3")
+
+
+def available() -> bool:
+    """Whether the extra is installed, with the MuJoCo of this environment."""
+    try:
+        engine()
+    except DraftError:
+        return False
+    return True

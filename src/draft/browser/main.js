@@ -173,7 +173,7 @@ class Page {
   link() {
     const values = ["forward", "left", "turn", "slow"].map((name) => [name, String(Number(Number($(name).value).toFixed(3)))]);
     for (const slider of this.shaped) values.push([slider.id, String(Number(Number(slider.value).toPrecision(5)))]);
-    history.replaceState(null, "", `#${new URLSearchParams(values)}`);
+    if (location.protocol !== "about:") history.replaceState(null, "", `#${new URLSearchParams(values)}`);
   }
 
   /** @param {number} index robot whose numbers the panel shows */

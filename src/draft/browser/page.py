@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from importlib.resources import files as resources
 from itertools import pairwise
 from pathlib import Path
+from typing import cast
 
 from draft import drawing, files
 from draft.browser.engine import engine
@@ -18,10 +19,10 @@ from draft.browser.robots import PageRobot, compiled, driven, network_numbers, r
 from draft.design import Design
 from draft.design.references import open_designs
 from draft.errors import DraftError
+from draft.explore.comparison import titles
 from draft.extras import own_version
 from draft.learn.policy.reduced import open_any
 from draft.plotting import COLORS
-from draft.reporting.subjects import titles
 from draft.spec import Spec
 from draft.variation.axes import Vary
 from draft.webpage import webpage
@@ -89,6 +90,15 @@ def page(
         for name, content in contents.items():
             (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
     return [target / name for name in contents]
+
+
+def single_page(robots: Sequence[PageRobot]) -> str:
+    """Text of a page in one file in which robots walk.
+
+    Raises:
+        DraftError: the extra `page` is not installed or is another MuJoCo.
+    """
+    return cast(str, _contents(robots, [], True)["index.html"])
 
 
 def _check(designs: Sequence[Design]) -> None:

@@ -130,6 +130,21 @@ def unique(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
+def titles(designs: Sequence[Design]) -> list[str]:
+    """Unique titles: the name of the robot, of the design, or both."""
+    robots = {design.name for design in designs}
+    titles: list[str] = []
+    for design in designs:
+        label = "" if design.label == "default" else design.label
+        if len(robots) == 1:
+            title = label or (design.name if len(designs) == 1 else "default")
+        else:
+            title = f"{design.name} {label}".strip()
+        titles.append(title)
+    # The design files of all saved models have the same name, `design`.
+    return list(unique(titles))
+
+
 def compare(
     designs: Sequence[Design],
     of: Sequence[str] = (),

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
+from draft.browser.page import single_page
 from draft.drawing import inlined, modules
 from draft.explore.comparison_tables import section as comparison_section
 from draft.extras import missing, own_version
@@ -19,6 +20,7 @@ from draft.reporting.tables import Html, text
 from draft.webpage import webpage
 
 if TYPE_CHECKING:
+    from draft.browser.robots import PageRobot
     from draft.explore.comparison import DesignComparison
     from draft.learn.policy.gait import Gait
 
@@ -32,9 +34,10 @@ def page(subjects: Sequence[Subject]) -> str:
     library = plotly()
     figures: dict[str, Any] = {}
     compared = comparison(subjects)
-    scene = scene3d.figure(subjects)
+    live = [subject.live for subject in subjects if subject.live is not None]
+    scene = None if live else scene3d.figure(subjects)
     makers = (
-        *(partial(_robots, scene), _overview, partial(_comparison, compared)),
+        *(partial(_robots, live, scene), _overview, partial(_comparison, compared)),
         *(_masses, _actuators, _findings, _metrics, _parameters),
     )
     sections = [section for make in makers if (section := make(subjects, figures))]
@@ -50,7 +53,7 @@ def page(subjects: Sequence[Subject]) -> str:
     )
     scripts = [library, f"\n{_asset('page.js')}"]
     if scene is None:
-        return webpage(title, _asset("page.css"), body, scripts)
+        return webpage(title, _asset("page.css"), body, scripts, frames=bool(live))
     drawing = {**modules(), "draft/robots": _asset("robots.js")}
     drawing = {name: inlined(script) for name, script in drawing.items()}
     scripts.append('import("draft/robots");')
@@ -114,8 +117,17 @@ def _plot(name: str, figure: Any, figures: dict[str, Any], caption: str) -> str:
 
 
 def _robots(
-    scene: dict[str, Any] | None, subjects: Sequence[Subject], figures: dict[str, Any]
+    live: Sequence[PageRobot],
+    scene: dict[str, Any] | None,
+    subjects: Sequence[Subject],
+    figures: dict[str, Any],
 ) -> str:
+    """Robots of the report: under live physics, recorded, or in their home poses."""
+    if live:
+        frame = (
+            f'<iframe class="live" title="Robots" srcdoc="{escape(single_page(live))}"></iframe>'
+        )
+        return _section("robots", "Robots", frame, _walks(subjects, controls=False))
     if scene is None:
         return ""
     walking = any(scene3d.walks(subject) for subject in subjects)

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from draft.browser.engine import available
+from draft.browser.page import MOST as MOST_LIVE
 from draft.design import Design
 from draft.design.report import report
 from draft.errors import DraftError, ModelError
-from draft.explore.comparison import DesignComparison, compare, unique
+from draft.explore.comparison import DesignComparison, compare, titles
 from draft.metrics import of_design, of_model
 from draft.model import Model
 from draft.model.model import preview
@@ -18,6 +20,7 @@ from draft.plotting import COLORS
 from draft.values import plain, scalar
 
 if TYPE_CHECKING:
+    from draft.browser.robots import PageRobot
     from draft.learn.policy.gait import Gait
     from draft.learn.policy.reduced import AnyPolicy
 
@@ -36,6 +39,7 @@ class Subject:
         record: its report as plain data.
         metrics: metrics by name; those of a model only if the design is accepted.
         gait: its recorded gait, or why it has none; None where the report shows no gaits.
+        live: what a page with live physics knows of it; None where the report has none.
     """
 
     design: Design
@@ -45,6 +49,7 @@ class Subject:
     record: dict[str, Any]
     metrics: dict[str, float]
     gait: Gait | None = None
+    live: PageRobot | None = None
 
 
 def subjects(
@@ -54,7 +59,8 @@ def subjects(
 
     Args:
         designs: 1 to 12 single designs.
-        walk: whether to record a gait of each that has a model.
+        walk: whether to record a gait of each that has a model, and to take what live physics
+            needs where the extra `page` is installed and they are few enough.
         policies: policies to walk with before those that ship.
 
     Raises:
@@ -66,6 +72,7 @@ def subjects(
     if any(design.count is not None for design in designs):
         raise DraftError("a report is about single designs", "select one: design[0]")
     found = []
+    few = walk and len(designs) <= MOST_LIVE and available()
     for i, (design, title) in enumerate(zip(designs, titles(designs), strict=True)):
         model = design.build() if design.accepted else _preview(design)
         values = of_model(model) if model is not None and design.accepted else of_design(design)
@@ -73,7 +80,8 @@ def subjects(
         record = plain(report(design))
         gait = _gait(model, policies) if walk and model is not None else None
         color = COLORS[i % len(COLORS)]
-        found.append(Subject(design, title, color, model, record, metrics, gait))
+        live = _live(model, title, color, policies) if few and model is not None else None
+        found.append(Subject(design, title, color, model, record, metrics, gait, live))
     return found
 
 
@@ -81,6 +89,12 @@ def _gait(model: Model, policies: Sequence[AnyPolicy]) -> Gait:
     from draft.learn.policy.gait import record  # reports without gaits do not need it
 
     return record(model, policies=policies)
+
+
+def _live(model: Model, title: str, color: str, policies: Sequence[AnyPolicy]) -> PageRobot:
+    from draft.browser.robots import driven, robot
+
+    return robot(model, title, color, driven([model], "walk", policies))
 
 
 def _preview(design: Design) -> Model | None:
@@ -106,18 +120,3 @@ def table(found: Sequence[Subject], compared: DesignComparison | None) -> dict[s
             for one in found
         },
     }
-
-
-def titles(designs: Sequence[Design]) -> list[str]:
-    """Unique titles: the name of the robot, of the design, or both."""
-    robots = {design.name for design in designs}
-    titles: list[str] = []
-    for design in designs:
-        label = "" if design.label == "default" else design.label
-        if len(robots) == 1:
-            title = label or (design.name if len(designs) == 1 else "default")
-        else:
-            title = f"{design.name} {label}".strip()
-        titles.append(title)
-    # The design files of all saved models have the same name, `design`.
-    return list(unique(titles))
