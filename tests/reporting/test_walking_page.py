@@ -13,6 +13,7 @@ import pytest
 
 from draft.design.references import open_designs
 from draft.model.picture import corners
+from draft.model.scene import home
 from draft.reporting import scene3d
 from draft.reporting.page import page
 from draft.reporting.subjects import Subject, subjects
@@ -73,7 +74,7 @@ def test_the_poses_of_a_frame_are_those_of_the_recorded_bodies(
         gait, model = subject.gait, subject.model
         assert gait is not None
         assert model is not None
-        data = scene3d.home(model)
+        data = home(model.design, model.mujoco)
         own = gait.positions if gait.walks else data.xpos[None, 1:]
         shape = (robot["frames"], robot["bodies"], 3)
         assert own.shape == shape
@@ -90,7 +91,8 @@ def test_the_scene_has_room_for_the_whole_gait(walking: list[Subject], text: str
     assert low[2] <= 0.0
     for robot, subject in zip(scene(text)["robots"], walking, strict=True):
         assert subject.model is not None
-        model, data = subject.model.mujoco, scene3d.home(subject.model)
+        model = subject.model.mujoco
+        data = home(subject.design, model)
         places = robot["quantum"] * unpacked(robot["positions"]).reshape(-1, 3)
         assert (places >= low).all()
         assert (places <= high).all()

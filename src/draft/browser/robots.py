@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +17,7 @@ from draft.learn.policy.validity import Fit, fits
 from draft.learn.policy.walk import FALL, FLOOR, Walk, plane_xml, start_position
 from draft.model import Model
 from draft.model.model import preview
-from draft.model.scene import home_position
+from draft.model.scene import home, home_position
 from draft.values import Array
 
 # Terms that the page computes (`robot.js`); the ground is a plane, so none sees heights.
@@ -150,9 +149,7 @@ def network_numbers(policy: Policy) -> NDArray[np.float32]:
 
 def _room(model: Model) -> tuple[Array, Array]:
     """Corners of the room that a robot takes at home [m], each of shape (3,)."""
-    data = mujoco.MjData(model.mujoco)
-    data.qpos[:] = home_position(model.design)
-    mujoco.mj_kinematics(model.mujoco, data)
+    data = home(model.design, model.mujoco)
     reach = model.mujoco.geom_rbound[:, None]
     return (data.geom_xpos - reach).min(axis=0), (data.geom_xpos + reach).max(axis=0)
 

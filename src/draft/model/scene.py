@@ -85,6 +85,14 @@ def home_position(design: Design) -> Array:
     return np.array([0.0, 0.0, scalar(design.lowest(home=True)), *UPRIGHT[3:], *joints])
 
 
+def home(design: Design, robot: mujoco.MjModel) -> mujoco.MjData:
+    """State of a robot in its home pose, standing at z = 0 above the origin."""
+    data = mujoco.MjData(robot)
+    data.qpos[:] = home_position(design)
+    mujoco.mj_kinematics(robot, data)
+    return data
+
+
 def _extent(
     design: Design, robot: mujoco.MjModel, pose: Array
 ) -> tuple[tuple[float, float, float], float]:

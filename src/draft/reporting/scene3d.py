@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from draft.drawing import geoms, packed
 from draft.model import Model
 from draft.model.picture import corners
-from draft.model.scene import home_position
+from draft.model.scene import home
 from draft.reporting.subjects import Subject
 from draft.values import Array
 
@@ -62,14 +62,6 @@ def figure(subjects: Sequence[Subject]) -> dict[str, Any] | None:
     }
 
 
-def home(model: Model) -> mujoco.MjData:
-    """State of a robot in its home pose, standing at z = 0 above the origin."""
-    data = mujoco.MjData(model.mujoco)
-    data.qpos[:] = home_position(model.design)
-    mujoco.mj_kinematics(model.mujoco, data)
-    return data
-
-
 def square(span: float) -> float:
     """Width of the floor's squares [m], the largest of which three fit into a span."""
     return max((step for step in _STEPS if span / step >= 3), default=_STEPS[0])
@@ -86,7 +78,7 @@ def _poses(subject: Subject, model: Model) -> tuple[Array, Array]:
     if gait is not None and gait.walks:
         positions, quaternions = gait.positions, gait.quaternions
     else:
-        data = home(model)
+        data = home(model.design, model.mujoco)
         positions, quaternions = data.xpos[None, 1:], data.xquat[None, 1:]
     c, s = math.cos(0.5 * YAW), math.sin(0.5 * YAW)
     w, x, y, z = np.moveaxis(quaternions, -1, 0)
@@ -97,7 +89,7 @@ def _poses(subject: Subject, model: Model) -> tuple[Array, Array]:
 
 def _room(model: Model, positions: Array, quaternions: Array) -> tuple[Array, Array]:
     """Corners of the room that a robot takes in all poses [m], each of shape (3,)."""
-    data = home(model)
+    data = home(model.design, model.mujoco)
     bodies = np.repeat(model.mujoco.geom_bodyid, 8)  # A box has 8 corners.
     away = corners(model.mujoco, data) - data.xpos[bodies]
     points = np.einsum("nji,nj->ni", data.xmat[bodies].reshape(-1, 3, 3), away)

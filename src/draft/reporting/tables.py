@@ -15,8 +15,8 @@ from draft.explore.comparison_tables import TextTable
 from draft.laws.actuators import Laws
 from draft.metrics import METRICS
 from draft.model.picture import corners
+from draft.model.scene import home
 from draft.reporting.plots import part_names, parts
-from draft.reporting.scene3d import home
 from draft.reporting.subjects import Subject
 from draft.values import scalar
 
@@ -141,7 +141,7 @@ def _size(subject: Subject) -> Sequence[float]:
     """Length, width and height in the home pose [m]; NaN without a model."""
     if subject.model is None:
         return (math.nan,) * 3
-    points = corners(subject.model.mujoco, home(subject.model))
+    points = corners(subject.model.mujoco, home(subject.design, subject.model.mujoco))
     return (points.max(axis=0) - points.min(axis=0)).tolist()
 
 

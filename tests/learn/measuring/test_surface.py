@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,6 +34,7 @@ from draft.learn.policy.policy import ANY, FAMILY, open_policy, policy  # noqa: 
 from draft.learn.policy.validity import ANY_NAME, FAMILY_NAME  # noqa: E402
 from draft.learn.task.recipes import LAPTOP  # noqa: E402
 from draft.learn.training.run import Plan, Run  # noqa: E402
+from draft.model.model import preview  # noqa: E402
 from tests.learn.measuring.columns import worlds  # noqa: E402
 from tests.learn.runs import begin, exported, trained  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
@@ -211,6 +213,25 @@ def test_the_command_writes_a_table_a_figure_and_a_record(
     assert progress.startswith("surface: 0 of 4\n")  # Also where stderr is no terminal.
     assert printed.startswith(f"{run.folder}: policy: iteration 1 of 1\n")
     assert "6 designs: 4 measured, 2 refused or unable to walk, 2 outside" in printed
+
+
+def test_the_page_draws_the_body_of_the_design_that_is_shown(
+    found: Surface, tmp_path: Path, browser: Any
+) -> None:
+    (tmp_path / "surface.html").write_text(page(found, "draft surface"), encoding="utf-8")
+    tab = browser.new_context(offline=True).new_page()
+    faults: list[str] = []
+    tab.on("pageerror", lambda error: faults.append(str(error)))
+    tab.goto((tmp_path / "surface.html").as_uri())
+    tab.wait_for_function("window.draftRobot")
+    for i in (0, len(found.refusal) - 1):
+        tab.evaluate(f"show({i})")
+        own = preview(found.designs[i]).mujoco
+        seen = tab.evaluate("[...draftRobot.model.geom_size]")
+        np.testing.assert_allclose(seen, own.geom_size.ravel(), atol=1e-6)
+        assert tab.evaluate("draftRobot.figure.group.visible")
+    assert faults == []
+    tab.context.close()
 
 
 @pytest.mark.parametrize(

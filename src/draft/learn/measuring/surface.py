@@ -44,6 +44,7 @@ class Surface:
         mass: mass of each design [kg], shape (N,).
         refusal: reason why a design is not measured, such as a finding; "" if it is.
         learned: capabilities; NaN for designs that are not measured.
+        designs: the designs, as arrays of N.
     """
 
     robot: str
@@ -53,6 +54,7 @@ class Surface:
     mass: Array
     refusal: tuple[str, ...]
     learned: Learned
+    designs: Design
 
     def grid(self, values: Array) -> Array:
         """Values of all designs as a table, shape (first axis, second axis)."""
@@ -151,6 +153,7 @@ def surface(
         mass=np.broadcast_to(np.asarray(many.mass, float), count).copy(),
         refusal=refusal,
         learned=found,
+        designs=many,
     )
 
 

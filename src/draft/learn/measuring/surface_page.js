@@ -4,6 +4,7 @@ const card = document.getElementById("design");
 let kept = null;
 
 function show(i) {
+  dispatchEvent(new CustomEvent("design", { detail: i })); // For the robot's picture.
   for (const svg of document.querySelectorAll("svg")) {
     const cell = svg.querySelector(`rect[data-i="${i}"]`);
     const mark = svg.querySelector(".mark");

@@ -8,12 +8,15 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from draft.errors import counted
+from draft.drawing import geoms, inlined, modules, packed
+from draft.errors import ModelError, counted
 from draft.metrics.capabilities import MEASURED, Capability
+from draft.model.model import preview
+from draft.model.scene import home
 from draft.plotting import COLORS
 from draft.values import Array, brief
 from draft.webpage import webpage
@@ -26,6 +29,8 @@ _LEFT, _TOP, _RIGHT, _BOTTOM = 58, 8, 92, 44  # Margins: ticks, bar of colours.
 _REFUSED, _FELL, _INK = "#d9d9d9", "#ffffff", "#57606a"
 _BAR = 24  # Steps of a bar of colours.
 _TICKS = 5
+_VARYING = ("geom_size", "geom_pos", "geom_quat", "mesh_vert")
+_MOST_DRAWN = 400  # Designs, of some 6 kB each.
 _KEY = 64  # Height of an entry of the key of joints.
 
 
@@ -50,14 +55,48 @@ def page(found: Surface, command: str, studio: str = "") -> str:
         "policy's region of validity (crosses). White: no speed at which 80 % stay up. Point at a "
         f"design; click to keep it.</p><p><code>{escape(command)}</code></p>"
         f'<div class="maps">{"".join(maps)}</div>'
-        '<aside id="design" aria-live="polite"><p>Point at a design.</p></aside></main>'
+        '<aside><div id="robot"></div><div id="design" aria-live="polite">'
+        "<p>Point at a design.</p></div></aside></main>"
     )
-    data = json.dumps(_rows(found, studio), allow_nan=False).replace("<", "\\u003c")
-    style, script = (
+    data = {"DESIGNS": _rows(found, studio), "BODIES": _bodies(found)}
+    texts = {name: json.dumps(rows, allow_nan=False) for name, rows in data.items()}
+    constants = [f"const {name} = {text};" for name, text in texts.items()]
+    style, script, robot = (
         (files("draft.learn.measuring") / name).read_text(encoding="utf-8")
-        for name in ("surface_page.css", "surface_page.js")
+        for name in ("surface_page.css", "surface_page.js", "surface_robot.js")
     )
-    return webpage(f"{found.robot}: surface", style, body, [f"const DESIGNS = {data};\n{script}"])
+    scripts = ["\n".join(constants).replace("<", "\\u003c") + f"\n{script}"]
+    used = {**modules(), "draft/surface": robot}
+    return webpage(
+        f"{found.robot}: surface",
+        style,
+        body,
+        [*scripts, 'import("draft/surface");'],
+        modules={name: inlined(text) for name, text in used.items()},
+    )
+
+
+def _bodies(found: Surface) -> dict[str, Any] | None:
+    """Geoms of the first body that has a model, and what differs in each design in its home pose.
+
+    None for a surface of so many designs that the page would be too large.
+    """
+    count = len(found.refusal)
+    if count > _MOST_DRAWN:
+        return None
+    first: dict[str, Any] = {}
+    rows: list[dict[str, str] | None] = []
+    for i in range(count):
+        try:
+            model = preview(found.designs[i])
+        except ModelError:
+            rows.append(None)
+            continue
+        first = first or geoms(model.mujoco)
+        data = home(model.design, model.mujoco)
+        parts = [getattr(model.mujoco, name) for name in _VARYING] + [data.xpos, data.xquat]
+        rows.append(packed(np.concatenate([part.ravel() for part in parts]), "f4"))
+    return {"geoms": first, "names": [*_VARYING, "xpos", "xquat"], "rows": rows}
 
 
 def _rows(found: Surface, studio: str) -> list[dict[str, object]]:
