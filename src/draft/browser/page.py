@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import gzip
-import hashlib
 import json
 from collections.abc import Sequence
 from importlib.resources import files as resources
@@ -14,7 +13,7 @@ from pathlib import Path
 from draft import files
 from draft.browser.engine import drawing, engine
 from draft.browser.grid import Grid, grid
-from draft.browser.robots import PageRobot, compiled, driven, network_numbers, robot
+from draft.browser.robots import PageRobot, compiled, driven, network_part, robot
 from draft.design import Design
 from draft.design.references import open_designs
 from draft.errors import DraftError
@@ -126,10 +125,8 @@ def _contents(
     for one in robots:
         record = dict(one.plain)
         if one.fit is not None:
-            numbers = network_numbers(one.fit.policy).astype("<f4").tobytes()
-            name = f"policy-{hashlib.sha256(numbers).hexdigest()[:12]}"
-            parts.setdefault(name, gzip.compress(numbers, 6, mtime=0))
-            record["network"] = name
+            record["network"], numbers = network_part(one.fit.policy)
+            parts.setdefault(record["network"], gzip.compress(numbers, 6, mtime=0))
         plain.append(record)
     if varied is not None:
         parts["bodies"] = gzip.compress(varied.numbers.astype("<f4").tobytes(), 6, mtime=0)

@@ -12,9 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from draft.errors import DraftError
 from draft.learn.policy.matching import ANGLES, OF_JOINTS
 from draft.learn.policy.policy import DESIGN, Policy
-from draft.learn.task.recipes import LAPTOP
 
-_OFFSET = LAPTOP.config.episodes.joints  # Largest offset of a joint at the start [rad].
 _HIDDEN = 5  # Group of the robot's geoms, which a height scan ignores.
 
 
@@ -74,11 +72,6 @@ class Controller:
         """Addresses of the joints in `qvel`, in the order of the policy, shape (joints,)."""
         return self._v
 
-    def offsets(self, seed: int) -> NDArray[np.float64]:
-        """Offsets of the joints at the start [rad], shape (joints,)."""
-        drawn = np.random.default_rng(seed).uniform(-_OFFSET, _OFFSET, len(self._q))
-        return self.policy.sign * drawn
-
     def resume(self, other: Controller) -> None:
         """Continue where another controller of the same joints stopped."""
         self._action, self._since = other._action.copy(), other._since
@@ -97,7 +90,7 @@ class Controller:
             mujoco.mj_resetDataKeyframe(self.model, data, 0)
         else:
             mujoco.mj_resetData(self.model, data)
-        data.qpos[self._q] = self.policy.home + self.offsets(seed)
+        data.qpos[self._q] = self.policy.home + self.policy.offsets(seed)
         self._action[:] = 0.0
         self._since = 0
         mujoco.mj_forward(self.model, data)

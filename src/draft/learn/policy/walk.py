@@ -177,7 +177,7 @@ class Walk:
 
     def _offset_joints(self) -> None:
         """Offset the joints as `Controller.reset` does, from the home pose of the design."""
-        offsets = self.controller.offsets(self._seed)
+        offsets = self.fit.policy.offsets(self._seed)
         self.data.qpos[self.controller.positions] += offsets
 
     def _depth(self) -> float:
