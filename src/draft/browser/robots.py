@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.errors import DraftError
+from draft.learn.policy.controller import start_offsets
 from draft.learn.policy.policy import Policy
 from draft.learn.policy.reduced import AnyPolicy
 from draft.learn.policy.validity import Fit, fits
@@ -174,6 +175,6 @@ def _policy(policy: Policy) -> dict[str, Any]:
         "period": policy.control_period,
         "timestep": policy.timestep,
         "fall": {"low": FALL.low, "tilt": FALL.tilt},
-        "offsets": policy.offsets(0).tolist(),
+        "offsets": start_offsets(policy, 0).tolist(),
         "sizes": [policy.network.size, *(len(bias) for _, bias in layers)],
     }

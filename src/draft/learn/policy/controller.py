@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from draft.errors import DraftError
 from draft.learn.policy.matching import ANGLES, OF_JOINTS
 from draft.learn.policy.policy import DESIGN, Policy
+from draft.learn.task.recipes import LAPTOP
 
+_OFFSET = LAPTOP.config.episodes.joints  # Largest offset of a joint at the start [rad].
 _HIDDEN = 5  # Group of the robot's geoms, which a height scan ignores.
 
 
@@ -90,7 +92,7 @@ class Controller:
             mujoco.mj_resetDataKeyframe(self.model, data, 0)
         else:
             mujoco.mj_resetData(self.model, data)
-        data.qpos[self._q] = self.policy.home + self.policy.offsets(seed)
+        data.qpos[self._q] = self.policy.home + start_offsets(self.policy, seed)
         self._action[:] = 0.0
         self._since = 0
         mujoco.mj_forward(self.model, data)
@@ -178,6 +180,12 @@ _TERMS = frozenset(
         DESIGN,
     }
 )
+
+
+def start_offsets(policy: Policy, seed: int) -> NDArray[np.float64]:
+    """Offsets of the joints at the start [rad], shape (joints,)."""
+    drawn = np.random.default_rng(seed).uniform(-_OFFSET, _OFFSET, len(policy.joints))
+    return policy.sign * drawn
 
 
 def _joint(model: mujoco.MjModel, name: str) -> int:

@@ -16,7 +16,6 @@ from draft.errors import DraftError, suggest
 from draft.learn.policy.matching import Structure, rolls_of_texts
 from draft.learn.policy.onnx_file import Network, read
 from draft.learn.task.constants import CONTACT_TIME
-from draft.learn.task.recipes import LAPTOP
 from draft.learn.task.scan import scan_points
 
 # Skills, and the stages of training that teach them.
@@ -30,7 +29,6 @@ FAMILIES = {"walk": FAMILY, "run": FAMILY, "push": FAMILY, "climb": CLIMBING_FAM
 # The policy of all legs; see `draft.learn.policy.reduced`.
 ANY = FOLDER.parents[1] / "policies" / "any.onnx"
 Array = NDArray[np.float64]
-_OFFSET = LAPTOP.config.episodes.joints  # Largest offset of a joint at the start [rad].
 
 
 @dataclass(frozen=True, repr=False)
@@ -131,11 +129,6 @@ class Policy:
             cause += f"{values.shape[-1] if values.ndim else 'one'}"
             raise DraftError(cause, f"concatenate, in order: {parts}")
         return self.network(values)
-
-    def offsets(self, seed: int) -> Array:
-        """Offsets of the joints at the start [rad], shape (joints,)."""
-        drawn = np.random.default_rng(seed).uniform(-_OFFSET, _OFFSET, len(self.joints))
-        return self.sign * drawn
 
     def torque(self, action: ArrayLike, angle: ArrayLike, speed: ArrayLike) -> Array:
         """Joint torques of the PD law, limited by the torque-speed line of a DC motor [N m].
