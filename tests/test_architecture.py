@@ -57,7 +57,7 @@ BELOW: dict[str, set[str]] = {
     "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"},
     "browser": {
         *("laws", "spec", "design", "model", "metrics", "variation", "explore", "learn"),
-        "reporting",
+        *("reporting", "serving"),
     },
     "studio": {
         *("laws", "spec", "design", "model", "metrics", "explore", "learn"),

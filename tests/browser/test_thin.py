@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from benchmarks import browser as chromium
-from draft.browser.designer import sources
+from draft.browser.designer import source
 from draft.browser.engine import engine
 from draft.design.references import open_design, shipped_designs
 from draft.spec import load
@@ -66,8 +66,8 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     (folder / "bridge.js").write_text((files("draft.browser") / "bridge.js").read_text(), "utf-8")
     messages = []
     for i, (reference, values) in enumerate(WHOLE):
-        texts, own = sources(open_design(reference))
-        message = {"id": i, "files": texts, "values": {**own, **values}}
+        own = source(open_design(reference))
+        message = {"id": i, "files": own["files"], "values": {**own["values"], **values}}
         messages.append(json.dumps({**message, "title": reference, "color": "#123456"}))
     # Hips apart from the trunk get brackets, by distances that MuJoCo measures.
     apart = json.loads(messages[1]) | {"values": {}}

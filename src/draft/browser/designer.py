@@ -7,7 +7,7 @@ A page asks with messages, and one class answers them in both places: in the pro
     {"id": 7, "files": {"parameters.yaml": "...", ...}, "values": {"thigh_length": 0.3},
      "title": "cheetah", "color": "#33608f", "known": ["policy-0123456789ab"]}
 
-are answered by the robot as the page has it (`draft.browser.robots.robot`), with the verdict, the
+("title" may be "" for the robot's own name) are answered by the robot as the page has it (`draft.browser.robots.robot`), with the verdict, the
 findings and the text of the model; the numbers of its network, unless the page knows it; and its
 fields, or by the problems:
 
@@ -79,7 +79,8 @@ class Designer:
     def _robot(self, asked: _Request) -> dict[str, Any]:
         design = _spec(tuple(asked.files.items())).resolve(dict(asked.values))
         model = compiled(design)
-        made = robot(model, asked.title, asked.color, driven([model], self._skill, self._policies))
+        title = asked.title or design.name
+        made = robot(model, title, asked.color, driven([model], self._skill, self._policies))
         found: dict[str, Any] = {"robot": made.plain, "fields": list(fields(design))}
         if made.fit is not None:
             made.plain["network"], numbers = network_part(made.fit.policy)
@@ -98,14 +99,14 @@ def _plain(problem: Problem) -> dict[str, str]:
     return {"where": where, "cause": problem.cause, "remedy": problem.remedy}
 
 
-def sources(design: Design) -> tuple[dict[str, str], dict[str, float | str | None]]:
-    """Texts of the files of a design's robot by name, and the design's values, for messages."""
-    files = {name: file.read_bytes().decode() for name, file in design.spec.files.items()}
+def source(design: Design) -> dict[str, Any]:
+    """Files of a design's robot by name, the design's values and its fields, for messages."""
     values = {
         name: value if value is None or isinstance(value, str) else scalar(value)
         for name, value in design.values.items()
     }
-    return files, values
+    files = {name: file.read_bytes().decode() for name, file in design.spec.files.items()}
+    return {"files": files, "values": values, "fields": list(fields(design))}
 
 
 def fields(design: Design) -> Iterator[dict[str, Any]]:

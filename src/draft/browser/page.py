@@ -5,12 +5,13 @@ from __future__ import annotations
 import base64
 import gzip
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files as resources
 from itertools import pairwise
 from pathlib import Path
 
 from draft import files
+from draft.browser.designer import source
 from draft.browser.engine import drawing, engine
 from draft.browser.grid import Grid, grid
 from draft.browser.robots import PageRobot, compiled, driven, network_part, robot
@@ -27,7 +28,18 @@ from draft.webpage import webpage
 
 MOST = 6
 SKILLS = ("walk", "run", "push")
-_MODULES = ("bodies", "inertia", "limits", "load", "network", "picture", "robot", "steer")
+DESIGNERS = ("", "live", "python")
+_MODULES = (
+    "bodies",
+    "designer",
+    "inertia",
+    "limits",
+    "load",
+    "network",
+    "picture",
+    "robot",
+    "steer",
+)
 _GAP = 0.5  # Room between two robots, per width of the wider one.
 _REMEDY = "choose another `out`"
 _MARK = "draft-page.json"  # File by which a folder is known as a page of Draft.
@@ -40,6 +52,7 @@ def page(
     single: bool = False,
     policies: Sequence[str | Path] = (),
     vary: Vary = (),
+    designer: str = "",
 ) -> list[Path]:
     """Write a web page in which designs walk side by side, under live physics.
 
@@ -55,6 +68,9 @@ def page(
         policies: ONNX files of policies to walk with before those that ship.
         vary: ranges of up to 5 numbers of one design, which become sliders: words such as
             "thigh_length=0.2:0.3", or (low, high) by name.
+        designer: what answers when a visitor changes any number or the files of a design: "live"
+            for a process of this machine (`draft.browser.live`), "python" for Python that the
+            visitor's browser loads from a host outside on request, or "" for nothing.
 
     Returns:
         The files written, the page first.
@@ -68,6 +84,7 @@ def page(
     if skill not in SKILLS:
         cause = f"a page shows no skill '{skill}': its ground is a plane"
         raise DraftError(cause, f"skills: {', '.join(SKILLS)}")
+    _check_designer(designer, single, policies)
     engine()
     opened = open_designs(given)
     _check(opened, bool(len(vary)))
@@ -83,7 +100,10 @@ def page(
         )
         for i, (model, title) in enumerate(zip(models, titles(opened), strict=True))
     ]
-    contents = _contents(robots, varied, single)
+    if designer:
+        for one, design in zip(robots, opened, strict=True):
+            one.plain["source"] = source(design)
+    contents = _contents(robots, varied, single, {"kind": designer, "skill": skill})
     target = Path(out if out is not None else "page.html" if single else "page")
     if single:
         files.write(target, contents["index.html"])
@@ -106,6 +126,18 @@ def _check(designs: Sequence[Design], varied: bool) -> None:
         raise DraftError("a page shows single designs", "select one: design[0]")
 
 
+def _check_designer(designer: str, single: bool, policies: Sequence[str | Path]) -> None:
+    if designer not in DESIGNERS:
+        cause = f"a page has no designer '{designer}'"
+        raise DraftError(cause, f"designers: {', '.join(map(repr, DESIGNERS))}")
+    if designer and single:
+        cause = "a page of one file has no designer: browsers start nothing beside such a page"
+        raise DraftError(cause, "omit `single`, or `designer`")
+    if designer == "python" and len(policies):
+        cause = "Python in a browser has the policies that ship alone"
+        raise DraftError(cause, 'omit `policies`, or choose the designer "live"')
+
+
 def _check_folder(folder: Path) -> None:
     """Refuse to replace what is not a page written by Draft."""
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
@@ -116,10 +148,13 @@ def _check_folder(folder: Path) -> None:
 
 
 def _contents(
-    robots: Sequence[PageRobot], varied: Grid | None, single: bool
+    robots: Sequence[PageRobot],
+    varied: Grid | None,
+    single: bool,
+    designer: Mapping[str, str] | None = None,
 ) -> dict[str, str | bytes]:
     """Contents of the files by name, the page first."""
-    modules = _modules()
+    modules, designer = _modules(), dict(designer or {"kind": ""})
     parts = {"mujoco.wasm": gzip.compress(engine().wasm, 6, mtime=0)}
     plain = []
     for one in robots:
@@ -134,6 +169,7 @@ def _contents(
         "vary": None if varied is None else varied.plain,
         "mujoco": engine().version,
         "lanes": _lanes(robots),
+        "designer": designer,
         "robots": plain,
     }
     body = (resources("draft.browser") / "body.html").read_text("utf-8")
