@@ -51,7 +51,7 @@ def test_a_message_is_answered_by_the_robot_with_its_verdict_and_its_text() -> N
 def test_a_refused_design_is_a_robot_with_its_findings() -> None:
     found = answer(message(values={"actuators.leg.peak_torque": 1}))["robot"]["said"]
     assert not found["accepted"]
-    assert found["findings"][0][:2] == ["error", "cannot_stand"]
+    assert ["error", "cannot_stand"] in [one[:2] for one in found["findings"]]
 
 
 def test_fields_are_all_parameters_and_what_actuators_state() -> None:
@@ -75,7 +75,10 @@ def test_fields_are_all_parameters_and_what_actuators_state() -> None:
         (message(values={"thigh_length": "1 +"}), "thigh_length"),
         (message(files={}), "file not found"),
         (message(files={"../tree.yaml": ""}), "file not found"),
-        (message(files={"parameters.yaml": "a: [", "tree.yaml": ""}), "parameters.yaml:1:"),
+        (
+            message(files={"parameters.yaml": "a: [", "tree.yaml": ""}),
+            "parameters.yaml:2:1 not valid YAML",
+        ),
     ],
 )
 def test_what_is_wrong_is_an_answer(asked: str, cause: str) -> None:
@@ -118,7 +121,7 @@ def test_a_server_has_its_files_and_answers_messages(server: MessageServer) -> N
     assert request(server, "POST", "/designer", **JSON) == (200, b"[]")
 
 
-@pytest.mark.parametrize("path", ["/../../etc/passwd", "/%2e%2e/a", "//a.js", "/b.js", "/designer"])
+@pytest.mark.parametrize("path", ["/../../etc/passwd", "/%2e%2e/a", "/b.js", "/designer"])
 def test_a_server_has_no_other_files(server: MessageServer, path: str) -> None:
     assert request(server, "GET", path)[0] == 404
 

@@ -7,9 +7,9 @@ A page asks with messages, and one class answers them in both places: in the pro
     {"id": 7, "files": {"parameters.yaml": "...", ...}, "values": {"thigh_length": 0.3},
      "title": "cheetah", "color": "#33608f", "known": ["policy-0123456789ab"]}
 
-("title" may be "" for the robot's own name) are answered by the robot as the page has it (`draft.browser.robots.robot`), with the verdict, the
+are answered by the robot as the page has it (`draft.browser.robots.robot`), with the verdict, the
 findings and the text of the model; the numbers of its network, unless the page knows it; and its
-fields, or by the problems:
+fields, or by the problems. A robot without a title has that of its files.
 
     {"id": 7, "robot": {...}, "network": "...", "fields": [{"name": "thigh_length", ...}]}
     {"id": 7, "problems": [{"where": "tree.yaml:3:5", "cause": "...", "remedy": "..."}]}

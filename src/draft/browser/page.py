@@ -9,8 +9,10 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files as resources
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from draft import files
+from draft.browser import pyodide
 from draft.browser.designer import source
 from draft.browser.engine import drawing, engine
 from draft.browser.grid import Grid, grid
@@ -103,7 +105,10 @@ def page(
     if designer:
         for one, design in zip(robots, opened, strict=True):
             one.plain["source"] = source(design)
-    contents = _contents(robots, varied, single, {"kind": designer, "skill": skill})
+    asked = {"kind": designer, "skill": skill}
+    if designer == "python":
+        asked |= pyodide.settings()
+    contents = _contents(robots, varied, single, asked)
     target = Path(out if out is not None else "page.html" if single else "page")
     if single:
         files.write(target, contents["index.html"])
@@ -151,7 +156,7 @@ def _contents(
     robots: Sequence[PageRobot],
     varied: Grid | None,
     single: bool,
-    designer: Mapping[str, str] | None = None,
+    designer: Mapping[str, Any] | None = None,
 ) -> dict[str, str | bytes]:
     """Contents of the files by name, the page first."""
     modules, designer = _modules(), dict(designer or {"kind": ""})
@@ -182,12 +187,18 @@ def _contents(
             body += _inside(f"part-{name}", "text/plain", base64.b64encode(content).decode())
         found = webpage(title, style, body, ['import "draft/main";'], modules=inlined)
         return {"index.html": found}
+    more: dict[str, str | bytes] = {}
+    if designer["kind"] == "python":
+        for name in ("designer-worker", "bridge"):
+            more[f"{name}.js"] = (resources("draft.browser") / f"{name}.js").read_text("utf-8")
+        parts[pyodide.ARCHIVE] = gzip.compress(pyodide.archive(), 6, mtime=0)
     addresses = {name: f"./{_file(name)}" for name in modules}
     found = webpage(title, style, body, [_SERVED], requests=True, modules=addresses)
     mark = json.dumps({"draft": own_version(), "mujoco": engine().version})
     return {
         "index.html": found,
         **{_file(name): text for name, text in modules.items()},
+        **more,
         **{f"{name}.gz": content for name, content in parts.items()},
         "LICENSES": _licences(),
         _MARK: mark + "\n",
