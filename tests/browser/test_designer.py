@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from benchmarks import browser as chromium
-from draft.browser import live
+from draft.browser import live, pyodide
 from draft.browser.designer import Designer, source
 from draft.browser.page import page
 from draft.design.references import open_design
@@ -317,6 +317,38 @@ def test_a_page_whose_process_has_ended_says_so(opened: Open) -> None:
     put(tab, "thigh_length", "0.3")
     settle(tab, problems=True)
     assert "The process of this page has ended" in tab.inner_text("#design-problems")
+
+
+@pytest.mark.slow
+def test_python_is_asked_for_by_its_button_alone_and_a_page_without_it_stays(
+    browser: Any, tmp_path: Path
+) -> None:
+    written = page(["cheetah"], tmp_path / "page", designer="python")
+    files = {path.name: path.read_bytes() for path in written}
+    server = MessageServer(files, "/none", lambda text: "")
+    tab = chromium.tab(browser)
+    outside: list[str] = []
+
+    def answer_outside(route: Any) -> None:
+        outside.append(route.request.url)
+        # Another file than that of the hash, as of a host that has been broken into.
+        route.fulfill(body="postMessage(1)", headers={"Access-Control-Allow-Origin": "*"})
+
+    tab.context.route(lambda url: not url.startswith("http://127.0.0.1"), answer_outside)
+    tab.goto(f"http://127.0.0.1:{server.port}/")
+    tab.wait_for_function("window.draftPage?.count.simulated > 0.2")
+    tab.click("#design > summary")
+    assert tab.locator("[data-name=thigh_length]").is_disabled()
+    assert outside == []
+    tab.click("#design-start")
+    settle(tab, problems=True)
+    assert "is not the file that this page was written for" in tab.inner_text("#design-problems")
+    assert {url.rpartition("/")[0] + "/" for url in outside} == {pyodide.OWN}
+    assert tab.locator("#design-start").is_enabled()
+    before = tab.evaluate("draftPage.count.simulated")
+    tab.wait_for_function(f"draftPage.count.simulated > {before}")
+    tab.context.close()
+    server.close()
 
 
 def test_a_page_without_a_designer_holds_no_files(tmp_path: Path) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import subprocess
 import sys
+import zipfile
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -15,8 +17,8 @@ import pytest
 from benchmarks import browser as chromium
 from draft.browser.designer import source
 from draft.browser.engine import engine
+from draft.browser.pyodide import archive
 from draft.design.references import open_design, shipped_designs
-from draft.spec import load
 from tests.browser import thin_robots
 
 pytestmark = pytest.mark.slow
@@ -24,6 +26,7 @@ pytest.importorskip("mjswan", reason="needs the extra page")
 pytest.importorskip("playwright", reason="needs Playwright")
 
 RANDOM = 300
+WRONG = ["<mujoco><bad/></mujoco>", "<mujoco", "<mujoco><worldbody><geom/></worldbody></mujoco>"]
 # Robots whose whole answers are compared: driven by their own policy, by that of a family, by that
 # of all legs, and by none; the last one is refused by the filter.
 WHOLE = [
@@ -34,24 +37,23 @@ WHOLE = [
 ]
 
 
-def designs() -> list[tuple[str, str | None, dict[str, float]]]:
+def designs() -> list[tuple[str, dict[str, Any]]]:
     """All shipped designs, and random ones around their numbers; some of these are impossible."""
-    shipped: list[tuple[str, str | None, dict[str, float]]] = [
-        (robot, design, {})
+    shipped = [
+        open_design(f"{robot}:{name}" if name else robot)
         for robot, named in shipped_designs().items()
-        for design in (None, *named)
+        for name in ("", *named)
     ]
-    rng, found = np.random.default_rng(7), [*shipped]
+    rng = np.random.default_rng(7)
+    found = [(one.spec.name, dict(one.values)) for one in shipped]
     for i in range(RANDOM):
-        robot, design, _ = shipped[i % len(shipped)]
-        spec = load(robot)
-        own = spec.resolve(design)
+        own = shipped[i % len(shipped)]
         values = {
             name: float(own.parameters[name] * rng.uniform(0.7, 1.4))
-            for name, parameter in spec.parameters.items()
+            for name, parameter in own.spec.parameters.items()
             if parameter.value.constant is not None and rng.random() < 0.7
         }
-        found.append((robot, design, values))
+        found.append((own.spec.name, {**own.values, **values}))
     return found
 
 
@@ -79,7 +81,14 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     messages.append(json.dumps(apart))
     bad = json.loads(messages[0])
     bad["files"]["root.yaml"] = bad["files"]["root.yaml"].replace("axis", "axes")
-    asked = {"designs": designs(), "messages": [*messages, json.dumps(bad), "{}"]}
+    zipfile.ZipFile(io.BytesIO(archive())).extractall(folder / "python")
+    robots = {robot: source(open_design(robot))["files"] for robot in shipped_designs()}
+    asked = {
+        "robots": robots,
+        "designs": designs(),
+        "wrong": WRONG,
+        "messages": [*messages, json.dumps(bad), "{}"],
+    }
     (folder / "asked.json").write_text(json.dumps(asked), "utf-8")
     script = [sys.executable, "-m", "tests.browser.thin_robots", str(folder)]
     subprocess.run(script, check=True)
@@ -87,9 +96,16 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return {"asked": asked, "thin": thin, "own": thin_robots.answer(asked)}
 
 
-def test_only_the_other_process_has_the_thin_module(answered: dict[str, Any]) -> None:
-    assert Path(answered["thin"]["mujoco"]).parent == thin_robots.THIN
-    assert Path(answered["own"]["mujoco"]).parent != thin_robots.THIN
+def test_the_other_process_has_the_python_of_the_worker_alone(answered: dict[str, Any]) -> None:
+    draft, mujoco = map(Path, answered["thin"]["modules"])
+    assert draft.parents[1].name == "python"
+    assert mujoco.parent == draft.parents[1] / thin_robots.THIN
+    assert "thin" not in answered["own"]["modules"][1]
+
+
+def test_mujoco_refuses_a_text_in_the_same_words(answered: dict[str, Any]) -> None:
+    assert all(answered["own"]["refusals"])
+    assert answered["thin"]["refusals"] == answered["own"]["refusals"]
 
 
 def test_texts_of_models_are_equal_to_the_last_byte(answered: dict[str, Any]) -> None:

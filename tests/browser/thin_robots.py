@@ -1,8 +1,8 @@
 """Robots by the thin `mujoco` of a page's worker, in a process of its own without the real one.
 
-Run as `thin_robots.py FOLDER`: FOLDER holds `mujoco.js`, `mujoco.wasm` and `bridge.js`, and
-`asked.json` with messages for the designer; `answers.json` gets the answers. MuJoCo for browsers
-runs in a browser, as in the page; only Python does not.
+Run as `thin_robots.py FOLDER`: FOLDER holds `mujoco.js`, `mujoco.wasm` and `bridge.js`, the archive
+of the worker's Python unpacked as `python`, and `asked.json`; `answers.json` gets the answers.
+MuJoCo for browsers runs in a browser, as in the page; only Python does not.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from types import SimpleNamespace
 
 from benchmarks import browser as chromium
 
-THIN = Path(__file__).parents[2] / "src" / "draft" / "browser" / "thin"
+THIN = Path("draft") / "browser" / "thin"
 PAGE = """<script type="module">
 import loadMujoco from "./mujoco.js";
 import { Bridge } from "./bridge.js";
@@ -40,7 +40,7 @@ def main(folder: Path) -> None:
         tab.wait_for_function("window.bridge")
         asked = SimpleNamespace(ask=lambda text: tab.evaluate("text => bridge.ask(text)", text))
         sys.modules["mujoco_js"] = asked  # type: ignore[assignment]
-        sys.path.insert(0, str(THIN))
+        sys.path[:0] = [str(folder / "python"), str(folder / "python" / THIN)]
         answers = answer(json.loads((folder / "asked.json").read_text("utf-8")))
         (folder / "answers.json").write_text(json.dumps(answers), "utf-8")
 
@@ -49,21 +49,30 @@ def answer(asked: dict) -> dict:
     """Texts of the models of some designs, or what is wrong with them; and whole answers."""
     import mujoco
 
+    import draft
     from draft.browser.designer import Designer
     from draft.errors import DraftError
     from draft.model.mjcf import robot_xml
-    from draft.spec import load
+    from draft.spec import Spec
 
-    def text(robot: str, design: str | None, values: dict) -> str:
+    def text(robot: str, values: dict) -> str:
         try:
-            return robot_xml(specs.setdefault(robot, load(robot)).resolve(design, values))
+            return robot_xml(specs[robot].resolve(values))
         except DraftError as error:
             return str(error)
 
-    specs: dict = {}
+    def refusal(xml: str) -> str:
+        try:
+            mujoco.MjModel.from_xml_string(xml)
+        except ValueError as error:
+            return str(error).strip()
+        return ""
+
+    specs = {robot: Spec.parse(files) for robot, files in asked["robots"].items()}
     designer = Designer("walk")
     return {
-        "mujoco": mujoco.__file__,
+        "modules": [draft.__file__, mujoco.__file__],
+        "refusals": [refusal(xml) for xml in asked["wrong"]],
         "texts": [text(*one) for one in asked["designs"]],
         "answers": [designer.answer(message) for message in asked["messages"]],
     }

@@ -24,10 +24,11 @@ export class Bridge {
     }
   }
 
-  /** @param {any} error of JavaScript, or an exception of C++, which is an address */
+  /** @param {any} error of JavaScript, or an exception of C++ */
   text(error) {
-    const [kind, said] = this.mujoco.getExceptionMessage?.(error) ?? ["", ""];
-    return said || error?.message || kind || String(error);
+    if (error instanceof Error) return error.message;
+    const [kind, said] = this.mujoco.getExceptionMessage?.(error) ?? [String(error), ""];
+    return said || kind;
   }
 
   version() {

@@ -53,7 +53,7 @@ async function start({ own, packages, hashes, needed, skill }) {
   python.registerJsModule("mujoco_js", { ask: (/** @type {string} */ text) => bridge.ask(text) });
   const failed = [];
   await python.loadPackage(needed, { messageCallback: () => {}, errorCallback: (/** @type {string} */ text) => failed.push(text) });
-  if (failed.length) throw new Error(failed[0]);
+  if (failed.length) throw new Error(failed.join(" ").replaceAll("\n", " "));
   python.unpackArchive(archive, "zip", { extractDir: HOME });
   python.runPython(`import sys; sys.path[:0] = ["${HOME}", "${HOME}/draft/browser/thin"]`);
   say("Draft is starting.");

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import mimetypes
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
 from urllib.parse import urlsplit
 
 from draft.serving.addresses import check_free, check_port
@@ -50,8 +52,7 @@ class MessageServer:
 
         Handler.files, Handler.path_of_messages = files, path
         Handler.answer, Handler.turn = staticmethod(answer), threading.Lock()
-        self._server = ThreadingHTTPServer((HOST, port), Handler)
-        self._server.daemon_threads = True
+        self._server = _Server((HOST, port), Handler)
         self.port = int(self._server.server_port)
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
 
@@ -59,6 +60,15 @@ class MessageServer:
         """Stop serving."""
         self._server.shutdown()
         self._server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Report an error, but not that a browser has left before its answer."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -115,7 +115,10 @@ class MjModel(_Struct):
         Raises:
             ValueError: MuJoCo does not accept it.
         """
-        return MjModel(_ask("model", xml))
+        try:
+            return MjModel(_ask("model", xml))
+        except ValueError as error:  # Bindings for Python say the cause alone.
+            raise ValueError(str(error).removeprefix("MuJoCo Error: Loading error: ")) from None
 
     def joint(self, key: str | int) -> _Named:
         """Joint of a name or an index."""
