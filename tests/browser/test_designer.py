@@ -151,9 +151,9 @@ def test_a_port_that_is_taken_is_said(server: MessageServer) -> None:
 @pytest.mark.parametrize(
     ("options", "cause"),
     [
-        ({"designer": "magic"}, "a page has no designer 'magic'"),
-        ({"designer": "live", "single": True}, "a page of one file has no designer"),
-        ({"designer": "python", "policies": ["a.onnx"]}, "has the policies that ship alone"),
+        ({"live": True, "python": True}, "`live` and `python` both let a page change designs"),
+        ({"live": True, "single": True}, "a page of one file changes no designs"),
+        ({"python": True, "policies": ["a.onnx"]}, "has the policies that ship alone"),
     ],
 )
 def test_pages_without_room_for_a_designer_say_so(
@@ -171,7 +171,7 @@ def opened(browser: Any, tmp_path: Path) -> Iterator[Open]:
     tabs: list[Any] = []
 
     def open_(*designs: str, **options: Any) -> Any:
-        servers.append(live.serve(page(designs, tmp_path / "page", designer="live", **options)))
+        servers.append(live.serve(page(designs, tmp_path / "page", live=True, **options)))
         tab = chromium.tab(browser, viewport={"width": 1280, "height": 900})
         tabs.append(tab)
         tab.faults, tab.asked, tab.server = [], [], servers[-1]
@@ -323,7 +323,7 @@ def test_a_page_whose_process_has_ended_says_so(opened: Open) -> None:
 def test_python_is_asked_for_by_its_button_alone_and_a_page_without_it_stays(
     browser: Any, tmp_path: Path
 ) -> None:
-    written = page(["cheetah"], tmp_path / "page", designer="python")
+    written = page(["cheetah"], tmp_path / "page", python=True)
     files = {path.name: path.read_bytes() for path in written}
     server = MessageServer(files, "/none", lambda text: "")
     tab = chromium.tab(browser)

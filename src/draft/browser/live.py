@@ -18,7 +18,7 @@ def serve(
     """Serve a page on this machine alone, and answer its messages.
 
     Args:
-        page: files of a page with `designer="live"`, see `draft.browser.page.page`.
+        page: files of a page that was written with `live`, see `draft.browser.page.page`.
         skill: what its policies can do, as the page was written with.
         policies: files of policies to walk with before those that ship.
         port: port to serve on; 0 for any free one.

@@ -30,7 +30,6 @@ from draft.webpage import webpage
 
 MOST = 6
 SKILLS = ("walk", "run", "push")
-DESIGNERS = ("", "live", "python")
 _MODULES = (
     "bodies",
     "designer",
@@ -54,7 +53,8 @@ def page(
     single: bool = False,
     policies: Sequence[str | Path] = (),
     vary: Vary = (),
-    designer: str = "",
+    live: bool = False,
+    python: bool = False,
 ) -> list[Path]:
     """Write a web page in which designs walk side by side, under live physics.
 
@@ -70,9 +70,10 @@ def page(
         policies: ONNX files of policies to walk with before those that ship.
         vary: ranges of up to 5 numbers of one design, which become sliders: words such as
             "thigh_length=0.2:0.3", or (low, high) by name.
-        designer: what answers when a visitor changes any number or the files of a design: "live"
-            for a process of this machine (`draft.browser.live`), "python" for Python that the
-            visitor's browser loads from a host outside on request, or "" for nothing.
+        live: whether visitors can change any number and the files of the designs, answered by a
+            process of this machine (`draft.browser.live.serve`).
+        python: whether they can with Python that a button of the page loads into their browser
+            from a public host.
 
     Returns:
         The files written, the page first.
@@ -86,7 +87,7 @@ def page(
     if skill not in SKILLS:
         cause = f"a page shows no skill '{skill}': its ground is a plane"
         raise DraftError(cause, f"skills: {', '.join(SKILLS)}")
-    _check_designer(designer, single, policies)
+    _check_designer(live, python, single, len(policies) > 0)
     engine()
     opened = open_designs(given)
     _check(opened, bool(len(vary)))
@@ -102,13 +103,13 @@ def page(
         )
         for i, (model, title) in enumerate(zip(models, titles(opened), strict=True))
     ]
-    if designer:
+    designer = {"kind": "live" if live else "python" if python else ""}
+    if live or python:
         for one, design in zip(robots, opened, strict=True):
             one.plain["source"] = source(design)
-    asked = {"kind": designer, "skill": skill}
-    if designer == "python":
-        asked |= pyodide.settings()
-    contents = _contents(robots, varied, single, asked)
+    if python:
+        designer |= {"skill": skill, **pyodide.settings()}
+    contents = _contents(robots, varied, single, designer)
     target = Path(out if out is not None else "page.html" if single else "page")
     if single:
         files.write(target, contents["index.html"])
@@ -131,16 +132,15 @@ def _check(designs: Sequence[Design], varied: bool) -> None:
         raise DraftError("a page shows single designs", "select one: design[0]")
 
 
-def _check_designer(designer: str, single: bool, policies: Sequence[str | Path]) -> None:
-    if designer not in DESIGNERS:
-        cause = f"a page has no designer '{designer}'"
-        raise DraftError(cause, f"designers: {', '.join(map(repr, DESIGNERS))}")
-    if designer and single:
-        cause = "a page of one file has no designer: browsers start nothing beside such a page"
-        raise DraftError(cause, "omit `single`, or `designer`")
-    if designer == "python" and len(policies):
+def _check_designer(live: bool, python: bool, single: bool, own: bool) -> None:
+    if live and python:
+        raise DraftError("`live` and `python` both let a page change designs", "give one of them")
+    if single and (live or python):
+        cause = "a page of one file changes no designs: browsers start nothing beside such a page"
+        raise DraftError(cause, f"omit `single`, or `{'live' if live else 'python'}`")
+    if python and own:
         cause = "Python in a browser has the policies that ship alone"
-        raise DraftError(cause, 'omit `policies`, or choose the designer "live"')
+        raise DraftError(cause, "pass `live` for policies of your own")
 
 
 def _check_folder(folder: Path) -> None:

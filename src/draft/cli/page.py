@@ -10,7 +10,7 @@ import tyro
 
 from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import DesignArguments, OwnPolicies
-from draft.errors import DraftError, counted
+from draft.errors import counted
 from draft.serving.addresses import address, check_free, check_port
 from draft.serving.messages import HOST
 
@@ -69,16 +69,13 @@ def main(
     policy drives stands, and the page says why.
     """
     start = time.perf_counter()
-    if live and python:
-        raise DraftError("--live and --python both change designs", "give one of them")
-    designer = "live" if live else "python" if python else ""
     check_port(port)
     if live:
         check_free(HOST, port)
     from draft.browser.page import page
 
     with if_interrupted(NOTHING):
-        written = page(designs, out, skill, single, policy, vary, designer)
+        written = page(designs, out, skill, single, policy, vary, live, python)
     first = written[0]
     print(first)
     print(f"{counted(len(designs), 'design')} in {time.perf_counter() - start:.1f} s")
