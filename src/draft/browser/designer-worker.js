@@ -51,7 +51,7 @@ async function start({ own, packages, hashes, needed, skill }) {
   });
   const bridge = new Bridge(await loadMujoco({ wasmBinary, locateFile: () => "" }));
   python.registerJsModule("mujoco_js", { ask: (/** @type {string} */ text) => bridge.ask(text) });
-  const failed = [];
+  const failed = /** @type {string[]} */ ([]);
   await python.loadPackage(needed, { messageCallback: () => {}, errorCallback: (/** @type {string} */ text) => failed.push(text) });
   if (failed.length) throw new Error(failed.join(" ").replaceAll("\n", " "));
   python.unpackArchive(archive, "zip", { extractDir: HOME });

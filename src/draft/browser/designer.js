@@ -110,7 +110,7 @@ export class Designer {
   /** Start Python in a worker, which asks a host outside the page for it. */
   start() {
     const python = new PythonWorker((text) => { $("design-note").textContent = text; });
-    this.ask = (message) => python.ask(message);
+    this.ask = (/** @type {string} */ message) => python.ask(message);
     $("design-start").disabled = true;
     this.want(this.shown).then((answered) => {
       $("design-start").disabled = answered;
