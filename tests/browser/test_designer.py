@@ -143,6 +143,20 @@ def test_other_sites_and_odd_messages_are_refused(
     assert request(server, "POST", "/designer", **{**JSON, **headers})[0] == status
 
 
+def test_a_fault_of_draft_is_an_answer_and_its_server_stays(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail(text: bytes) -> str:
+        raise RuntimeError("a fault")
+
+    server = MessageServer({}, "/designer", fail)
+    status, content = request(server, "POST", "/designer", **JSON)
+    assert (status, content[:12]) == (500, b"Draft failed")
+    assert "RuntimeError: a fault" in capsys.readouterr().err
+    assert request(server, "POST", "/designer", **JSON)[0] == 500
+    server.close()
+
+
 def test_a_port_that_is_taken_is_said(server: MessageServer) -> None:
     with pytest.raises(DraftError, match="another page or program uses it"):
         MessageServer({}, "/designer", lambda text: "", server.port)

@@ -92,6 +92,7 @@ export class Designer {
     if (!page.designer.kind) return;
     const { kind } = page.designer;
     $("design-python").hidden = kind !== "python";
+    if (kind === "python") $("design-host").textContent = new URL(page.designer.own).host;
     $("design-fields").disabled = kind === "python"; // Until Python has started.
     $("design-start").addEventListener("click", () => this.start());
     $("design-back").addEventListener("click", () => this.reset(structuredClone(this.first[this.shown])));

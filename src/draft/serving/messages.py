@@ -5,6 +5,7 @@ from __future__ import annotations
 import mimetypes
 import sys
 import threading
+import traceback
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -104,8 +105,14 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, cause.encode(), "text/plain")
         else:
             message = self.rfile.read(int(length))
-            with self.turn:
-                found = self.answer(message)
+            try:
+                with self.turn:
+                    found = self.answer(message)
+            except Exception:  # A fault of Draft, which must not look like an end of the process.
+                traceback.print_exc()
+                cause = b"Draft failed; the terminal that serves this page says how."
+                self._send(HTTPStatus.INTERNAL_SERVER_ERROR, cause, "text/plain")
+                return
             self._send(HTTPStatus.OK, found.encode(), "application/json")
 
     def _allowed(self) -> str | None:
