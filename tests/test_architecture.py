@@ -55,7 +55,10 @@ BELOW: dict[str, set[str]] = {
     "variation": {"laws", "spec"},
     "learn": {"laws", "spec", "design", "model", "metrics", "variation", "serving"},
     "explore": {"laws", "spec", "design", "model", "metrics", "variation", "learn"},
-    "browser": {"laws", "spec", "design", "model", "metrics", "variation", "explore", "learn"},
+    "browser": {
+        *("laws", "spec", "design", "model", "metrics", "variation", "explore", "learn"),
+        "serving",
+    },
     "reporting": {
         *("laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"),
         "browser",
@@ -299,6 +302,24 @@ def test_asking_for_help_is_light() -> None:
 
 def test_loading_and_resolving_need_no_mujoco() -> None:
     assert "mujoco" not in _loaded_after("import draft; draft.load('quadruped').resolve('bear')")
+
+
+def test_the_text_of_a_model_its_verdict_and_messages_need_neither_mujoco_nor_a_terminal() -> None:
+    absent = ("mujoco", "rich", "tyro", "trimesh", "collada")
+    code = f"""import sys
+for name in {absent}:
+    sys.modules[name] = None
+import draft
+from draft.model.mjcf import robot_xml
+arm = draft.load("arm").resolve()
+weak = draft.load("quadruped").resolve({{"actuators.leg.peak_torque": 1}})
+assert robot_xml(arm).startswith("<mujoco ") and arm.accepted and not weak.accepted
+assert all(finding.message for finding in weak.findings)
+try:
+    draft.load("quadruped").resolve({{"thigh": 1}})
+except draft.DraftError as error:
+    assert "thigh_length" in str(error)"""
+    assert _loaded_after(code) == {"numpy", "pydantic", "yaml"} | {"mujoco", "trimesh"}
 
 
 def test_building_a_robot_needs_the_laws_and_nothing_that_fits_or_draws(tmp_path: Path) -> None:

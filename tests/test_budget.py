@@ -17,8 +17,8 @@ SOURCE = Path(draft.__file__).parent
 BUDGET = {
     ".": 2_460,
     "assistant": 620,
-    "browser": 820,
-    "cli": 5_920,  # `--ros2` of export.
+    "browser": 1_290,  # The designer of a page, its server, Python in a worker and a thin MuJoCo.
+    "cli": 5_960,  # `--live` and `--python` of pages.
     "description": 2_330,
     "design": 6_450,
     "drawing": 70,
@@ -28,9 +28,9 @@ BUDGET = {
     "laws": 2_090,  # The nearest module of the catalogue.
     "learn": 20_260,
     "metrics": 3_200,
-    "model": 5_160,  # STEP, a bill of materials, SDFormat, and the package for ROS 2.
+    "model": 5_180,  # STEP, a bill of materials, SDFormat, and the package for ROS 2.
     "reporting": 1_590,
-    "serving": 560,
+    "serving": 700,  # Files and messages for a page on this machine.
     "spec": 5_170,
     "studio": 3_160,
     "study": 6_470,

@@ -1,6 +1,7 @@
 // The page: robots that walk side by side in real time, and the panel beside them.
 import loadMujoco from "mujoco";
 import { Bodies } from "draft/bodies";
+import { Designer } from "draft/designer";
 import { Limits } from "draft/limits";
 import { page, part } from "draft/load";
 import { Network } from "draft/network";
@@ -29,13 +30,14 @@ function element(tag, text, kind = "") {
 class Page {
   /**
    * @param {any} mujoco
-   * @param {(Network | null)[]} networks
+   * @param {Map<string, Float32Array>} networks numbers by name
    * @param {Bodies[]} bodies of the robots, empty if none varies
    */
   constructor(mujoco, networks, bodies) {
     this.bodies = bodies;
-    this.robots = page.robots.map((/** @type {any} */ one, /** @type {number} */ i) =>
-      new Robot(mujoco, one, networks[i], one.numbers));
+    this.networks = networks;
+    this.robots = page.robots.map((/** @type {any} */ one) => new Robot(mujoco, one, one.policy &&
+      Network.read(/** @type {Float32Array} */ (networks.get(one.network)), one.policy.sizes), one.numbers));
     for (const robot of this.robots) robot.refresh(); // Each model may have grown the memory.
     this.shown = 0; // Robot of the panel.
     this.speeds = this.robots.map(() => 0);
@@ -54,6 +56,7 @@ class Page {
     this.shapes();
     this.picture = new Picture($("view"));
     this.picture.show(this.robots, page.robots.map((/** @type {any} */ one) => one.color), page.lanes);
+    this.designer = new Designer(this);
     this.choose(0);
     this.open();
     requestAnimationFrame((now) => this.frame(now));
@@ -114,7 +117,9 @@ class Page {
     if (!this.bodies.length) return;
     const begun = performance.now();
     this.bodies.forEach((bodies, i) => {
-      const { columns, said, between } = bodies.at(this.values(i));
+      const values = this.values(i);
+      if (this.designer.slide(i, values)) return;
+      const { columns, said, between } = bodies.at(values);
       this.robots[i].setBody(columns, bodies.vary.columns);
       Object.assign(page.robots[i], { said, between });
       this.picture.figures[i].shape();
@@ -123,6 +128,23 @@ class Page {
     this.choose(this.shown);
     this.steer();
     this.count.reshaped = performance.now() - begun; // [ms]
+  }
+
+  /**
+   * Put another robot in the place of one.
+   * @param {number} index
+   * @param {Robot} robot
+   */
+  put(index, robot) {
+    this.robots[index].delete();
+    this.robots[index] = robot;
+    for (const one of this.robots) one.refresh();
+    const { yaw, pitch, away } = this.picture;
+    this.picture.show(this.robots, page.robots.map((/** @type {any} */ one) => one.color), page.lanes);
+    Object.assign(this.picture, { yaw, pitch, away }); // The view is the visitor's.
+    this.picture.follow(true);
+    $("steering").hidden = this.robots.every((/** @type {Robot} */ one) => !one.policy);
+    this.steer();
   }
 
   /** Commands as the sliders have them, to all robots and to the link. */
@@ -202,6 +224,7 @@ class Page {
       return row;
     }));
     $("load").hidden = !one.policy;
+    this.designer.show(index);
   }
 
   /**
@@ -262,12 +285,10 @@ async function start() {
   if (mujoco.mj_versionString() !== page.mujoco)
     throw new Error(`its MuJoCo is ${mujoco.mj_versionString()}, and the robots are of ${page.mujoco}`);
   const numbers = new Map(names.map((name, i) => [name, new Float32Array(rows[i])]));
-  const networks = page.robots.map((/** @type {any} */ one) =>
-    one.policy ? Network.read(/** @type {Float32Array} */ (numbers.get(one.network)), one.policy.sizes) : null);
   const bodies = await Promise.all(page.vary.map(async (/** @type {any} */ vary, /** @type {number} */ i) =>
     new Bodies(vary, new Float32Array(await part(`bodies-${i}`)))));
   $("note").textContent = "";
-  Object.assign(window, { draftPage: new Page(mujoco, networks, bodies) }); // For tests and measurements.
+  Object.assign(window, { draftPage: new Page(mujoco, numbers, bodies) }); // For tests and measurements.
 }
 
 start().catch(refuse);

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import base64
 import gzip
-import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files as resources
 from itertools import pairwise
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from draft import drawing, files
+from draft.browser import pyodide
+from draft.browser.designer import source
 from draft.browser.engine import engine
 from draft.browser.grid import Grid, grid
-from draft.browser.robots import PageRobot, compiled, driven, network_numbers, robot
+from draft.browser.robots import PageRobot, compiled, driven, network_part, robot
 from draft.design import Design
 from draft.design.references import open_designs
 from draft.errors import DraftError
@@ -29,7 +30,17 @@ from draft.webpage import webpage
 
 MOST = 6
 SKILLS = ("walk", "run", "push")
-_MODULES = ("bodies", "inertia", "limits", "load", "network", "picture", "robot", "steer")
+_MODULES = (
+    "bodies",
+    "designer",
+    "inertia",
+    "limits",
+    "load",
+    "network",
+    "picture",
+    "robot",
+    "steer",
+)
 _GAP = 0.5  # Room between two robots, per width of the wider one.
 _REMEDY = "choose another `out`"
 _MARK = "draft-page.json"  # File by which a folder is known as a page of Draft.
@@ -42,6 +53,8 @@ def page(
     single: bool = False,
     policies: Sequence[str | Path] = (),
     vary: Vary = (),
+    live: bool = False,
+    python: bool = False,
 ) -> list[Path]:
     """Write a web page in which designs walk side by side, under live physics.
 
@@ -58,6 +71,10 @@ def page(
         vary: ranges of up to 5 numbers of the designs, which become sliders: words such as
             "thigh_length=0.2:0.3" or `thigh_length=*0.8:*1.2`, factors of each design's own number,
             or (low, high) by name. A slider moves all designs.
+        live: whether visitors can change any number and the files of the designs, answered by a
+            process of this machine (`draft.browser.live.serve`).
+        python: whether they can with Python that a button of the page loads into their browser
+            from a public host.
 
     Returns:
         The files written, the page first.
@@ -71,6 +88,7 @@ def page(
     if skill not in SKILLS:
         cause = f"a page shows no skill '{skill}': its ground is a plane"
         raise DraftError(cause, f"skills: {', '.join(SKILLS)}")
+    _check_designer(live, python, single, len(policies) > 0)
     engine()
     opened = open_designs(given)
     _check(opened)
@@ -80,7 +98,13 @@ def page(
     by = [one.by for one in varied] or [driven([model], skill, own) for model in models]
     rows = zip(models, titles(opened), COLORS, by, strict=False)  # There are more colours.
     robots = [robot(*row) for row in rows]
-    contents = _contents(robots, varied, single)
+    designer = {"kind": "live" if live else "python" if python else ""}
+    if live or python:
+        for one, design in zip(robots, opened, strict=True):
+            one.plain["source"] = source(design)
+    if python:
+        designer |= {"skill": skill, **pyodide.settings()}
+    contents = _contents(robots, varied, single, designer)
     target = Path(out if out is not None else "page.html" if single else "page")
     if single:
         files.write(target, contents["index.html"])
@@ -109,6 +133,17 @@ def _check(designs: Sequence[Design]) -> None:
         raise DraftError("a page shows single designs", "select one: design[0]")
 
 
+def _check_designer(live: bool, python: bool, single: bool, own: bool) -> None:
+    if live and python:
+        raise DraftError("`live` and `python` both let a page change designs", "give one of them")
+    if single and (live or python):
+        cause = "a page of one file changes no designs: browsers start nothing beside such a page"
+        raise DraftError(cause, f"omit `single`, or `{'live' if live else 'python'}`")
+    if python and own:
+        cause = "Python in a browser has the policies that ship alone"
+        raise DraftError(cause, "pass `live` for policies of your own")
+
+
 def _check_folder(folder: Path) -> None:
     """Refuse to replace what is not a page written by Draft."""
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
@@ -119,19 +154,20 @@ def _check_folder(folder: Path) -> None:
 
 
 def _contents(
-    robots: Sequence[PageRobot], varied: Sequence[Grid], single: bool
+    robots: Sequence[PageRobot],
+    varied: Sequence[Grid],
+    single: bool,
+    designer: Mapping[str, Any] | None = None,
 ) -> dict[str, str | bytes]:
     """Contents of the files by name, the page first."""
-    modules = _modules()
+    modules, designer = _modules(), dict(designer or {"kind": ""})
     parts = {"mujoco.wasm": gzip.compress(engine().wasm, 6, mtime=0)}
     plain = []
     for one in robots:
         record = dict(one.plain)
         if one.fit is not None:
-            numbers = network_numbers(one.fit.policy).astype("<f4").tobytes()
-            name = f"policy-{hashlib.sha256(numbers).hexdigest()[:12]}"
-            parts.setdefault(name, gzip.compress(numbers, 6, mtime=0))
-            record["network"] = name
+            record["network"], numbers = network_part(one.fit.policy)
+            parts.setdefault(record["network"], gzip.compress(numbers, 6, mtime=0))
         plain.append(record)
     for i, one in enumerate(varied):
         parts[f"bodies-{i}"] = gzip.compress(one.numbers.astype("<f4").tobytes(), 6, mtime=0)
@@ -139,6 +175,7 @@ def _contents(
         "vary": [one.plain for one in varied],
         "mujoco": engine().version,
         "lanes": _lanes(robots),
+        "designer": designer,
         "robots": plain,
     }
     body = (resources("draft.browser") / "body.html").read_text("utf-8")
@@ -153,12 +190,18 @@ def _contents(
             title, style, body, ['import("draft/main");'], modules=inlined, compiles=True
         )
         return {"index.html": found}
+    more: dict[str, str | bytes] = {}
+    if designer["kind"] == "python":
+        for name in ("designer-worker", "bridge"):
+            more[f"{name}.js"] = (resources("draft.browser") / f"{name}.js").read_text("utf-8")
+        parts[pyodide.ARCHIVE] = gzip.compress(pyodide.archive(), 6, mtime=0)
     addresses = {name: f"./{_file(name)}" for name in modules}
     found = webpage(title, style, body, [_SERVED], requests=True, modules=addresses, compiles=True)
     mark = json.dumps({"draft": own_version(), "mujoco": engine().version})
     return {
         "index.html": found,
         **{_file(name): text for name, text in modules.items()},
+        **more,
         **{f"{name}.gz": content for name, content in parts.items()},
         "LICENSES": _licences(),
         _MARK: mark + "\n",

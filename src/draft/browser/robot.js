@@ -148,11 +148,42 @@ export class Robot {
     this.lift(depth, 0);
   }
 
+  /**
+   * Continue where another robot stopped, as `Walk.swap`; one of other joints starts at its place.
+   * @param {Robot} other
+   */
+  resume(other) {
+    Object.assign(this, { command: other.command, falls: other.falls });
+    this.data.time = other.data.time;
+    const names = (/** @type {Robot} */ one) => String(one.policy?.joints);
+    const { qpos, qvel } = other.data;
+    if (!this.policy || names(this) !== names(other) || qpos.length !== this.qpos.length) {
+      if (this.floats && other.floats) this.qpos.set(qpos.slice(0, 2));
+      this.mujoco.mj_forward(this.model, this.data);
+      return;
+    }
+    this.mujoco.mj_fwdPosition(other.model, other.data);
+    const depth = other.depth();
+    this.grab();
+    this.qpos.set(other.data.qpos);
+    this.qvel.set(other.data.qvel);
+    this.action.set(other.action);
+    this.since = other.since;
+    this.lying = other.lying;
+    this.mujoco.mj_forward(this.model, this.data);
+    this.lift(depth, 0);
+  }
+
+  /** Whether its base is free. */
+  get floats() {
+    return this.model.jnt_type.length > 0 && this.model.jnt_type[0] === 0;
+  }
+
   /** Put the robot back to its home pose, where it stands now. */
   restart() {
     this.refresh();
     const [x, y] = this.qpos, { time } = this.data, home = this.numbers.home_position;
-    const moved = this.model.jnt_type.length && this.model.jnt_type[0] === 0; // a free joint
+    const moved = this.floats;
     this.mujoco.mj_resetData(this.model, this.data);
     this.data.time = time;
     this.qpos.set(home);

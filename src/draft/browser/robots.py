@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,10 +12,11 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.errors import DraftError
+from draft.learn.policy.controller import start_offsets
 from draft.learn.policy.policy import Policy
 from draft.learn.policy.reduced import AnyPolicy
 from draft.learn.policy.validity import Fit, fits
-from draft.learn.policy.walk import FALL, FLOOR, Walk, plane_xml, start_position
+from draft.learn.policy.walk import FALL, FLOOR, plane_xml, start_position
 from draft.model import Model
 from draft.model.model import preview
 from draft.model.scene import home, home_position
@@ -115,7 +117,7 @@ def robot(model: Model, title: str, color: str, by: Driven) -> PageRobot:
         "said": said(design, chosen),
     }
     if chosen is not None:
-        plain["policy"] = _policy(chosen.policy, Walk(model, chosen))
+        plain["policy"] = _policy(chosen.policy)
         plain["numbers"] = body_numbers(model, chosen)
     return PageRobot(chosen, plain)
 
@@ -140,6 +142,12 @@ def body_numbers(model: Model, chosen: Fit) -> dict[str, list[float]]:
     }
 
 
+def network_part(policy: Policy) -> tuple[str, bytes]:
+    """Name of a policy's network by its content, and its numbers in single precision."""
+    content = network_numbers(policy).astype("<f4").tobytes()
+    return f"policy-{hashlib.sha256(content).hexdigest()[:12]}", content
+
+
 def network_numbers(policy: Policy) -> NDArray[np.float32]:
     """Numbers of a policy's network in one row: mean, divisor, then the layers, shape (n,)."""
     mean, divisor, layers = policy.network.layers()
@@ -154,7 +162,7 @@ def _room(model: Model) -> tuple[Array, Array]:
     return (data.geom_xpos - reach).min(axis=0), (data.geom_xpos + reach).max(axis=0)
 
 
-def _policy(policy: Policy, walk: Walk) -> dict[str, Any]:
+def _policy(policy: Policy) -> dict[str, Any]:
     """What the page reads of a policy, without the numbers of its body."""
     layers = policy.network.layers()[2]
     return {
@@ -164,6 +172,6 @@ def _policy(policy: Policy, walk: Walk) -> dict[str, Any]:
         "period": policy.control_period,
         "timestep": policy.timestep,
         "fall": {"low": FALL.low, "tilt": FALL.tilt},
-        "offsets": walk.controller.offsets(0).tolist(),
+        "offsets": start_offsets(policy, 0).tolist(),
         "sizes": [policy.network.size, *(len(bias) for _, bias in layers)],
     }

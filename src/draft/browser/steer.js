@@ -34,6 +34,8 @@ export class Steering {
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const target = /** @type {HTMLElement} */ (event.target);
+    const typed = /** @type {HTMLInputElement} */ (target).type;
+    if (["TEXTAREA", "SELECT"].includes(target.tagName) || typed === "text") return;
     if (target.tagName === "INPUT" && event.key.startsWith("Arrow")) return; // It moves the slider.
     if (event.key === " " && target.tagName !== "BUTTON" && target.tagName !== "SUMMARY") this.command = [0, 0, 0];
     else if (event.key === "p") this.heard.push(1);

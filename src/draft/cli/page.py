@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from typing import Annotated, Literal
 
@@ -10,6 +11,8 @@ import tyro
 from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import DesignArguments, OwnPolicies
 from draft.errors import counted
+from draft.serving.addresses import address, check_free, check_port
+from draft.serving.messages import HOST
 
 
 def main(
@@ -33,6 +36,23 @@ def main(
         bool,
         tyro.conf.arg(help="Write one file that opens from the disk, without a server or network."),
     ] = False,
+    live: Annotated[
+        bool,
+        tyro.conf.arg(
+            help="Serve the page on this machine: in it, every number and the files of the designs "
+            "can be changed, with the filter's messages."
+        ),
+    ] = False,
+    port: Annotated[
+        int, tyro.conf.arg(metavar="N", help="Port of --live; 0 for any free one.")
+    ] = 8080,
+    python: Annotated[
+        bool,
+        tyro.conf.arg(
+            help="The same without a server: a button in the page loads Python (11 MB) from a "
+            "public host into the visitor's browser."
+        ),
+    ] = False,
     out: Annotated[
         str | None,
         tyro.conf.arg(
@@ -49,12 +69,25 @@ def main(
     drives stands, and the page says why.
     """
     start = time.perf_counter()
+    check_port(port)
+    if live:
+        check_free(HOST, port)
     from draft.browser.page import page
 
     with if_interrupted(NOTHING):
-        first, *_ = page(designs, out, skill, single, policy, vary)
+        written = page(designs, out, skill, single, policy, vary, live, python)
+    first = written[0]
     print(first)
     print(f"{counted(len(designs), 'design')} in {time.perf_counter() - start:.1f} s")
+    if live:
+        from draft.browser.live import serve
+
+        server = serve(written, skill, policy, port)
+        print(f"open {address(HOST, server.port)} in a browser; Ctrl-C ends it", flush=True)
+        try:
+            threading.Event().wait()
+        finally:
+            server.close()
     if not single:
         print(f"show it: python -m http.server --directory {first.parent}")
     return 0

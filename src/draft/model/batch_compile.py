@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.model.batch_layout import TYPES, Geoms, Index, Layout
 from draft.model.decimals import rounded
 from draft.model.principal import apply, matrices, off_centre, principal, product, turned

@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +30,8 @@ from draft.spec.primitives.root import TrunkPart
 from draft.values import Array, Value, both, either, is_array, scalar, sqrt, where
 
 if TYPE_CHECKING:
+    import mujoco
+
     from draft.spec import Spec
 
 # Coordinates of the trunk's mesh below it are zero [m].
@@ -96,6 +97,8 @@ def _hanging(spec: Spec) -> dict[int, str]:
     They are those of the spec's own values, so that all its designs have one topology. A spec
     that has no model with its own values has none.
     """
+    import mujoco  # Only a robot with a trunk needs it.
+
     try:
         design = spec.resolve()
         model = mujoco.MjModel.from_xml_string(_robot(design, ()).text())
@@ -117,6 +120,8 @@ def _hanging(spec: Spec) -> dict[int, str]:
 
 def _gap(model: mujoco.MjModel, data: mujoco.MjData, first: int, second: int) -> float:
     """Distance of two geoms [m], up to `_FAR`."""
+    import mujoco
+
     return mujoco.mj_geomDistance(model, data, first, second, _FAR, None)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.design import Design
 from draft.errors import ModelError, Problem, RefusedError
 from draft.model import mjcf

@@ -74,11 +74,6 @@ class Controller:
         """Addresses of the joints in `qvel`, in the order of the policy, shape (joints,)."""
         return self._v
 
-    def offsets(self, seed: int) -> NDArray[np.float64]:
-        """Offsets of the joints at the start [rad], shape (joints,)."""
-        drawn = np.random.default_rng(seed).uniform(-_OFFSET, _OFFSET, len(self._q))
-        return self.policy.sign * drawn
-
     def resume(self, other: Controller) -> None:
         """Continue where another controller of the same joints stopped."""
         self._action, self._since = other._action.copy(), other._since
@@ -97,7 +92,7 @@ class Controller:
             mujoco.mj_resetDataKeyframe(self.model, data, 0)
         else:
             mujoco.mj_resetData(self.model, data)
-        data.qpos[self._q] = self.policy.home + self.offsets(seed)
+        data.qpos[self._q] = self.policy.home + start_offsets(self.policy, seed)
         self._action[:] = 0.0
         self._since = 0
         mujoco.mj_forward(self.model, data)
@@ -185,6 +180,12 @@ _TERMS = frozenset(
         DESIGN,
     }
 )
+
+
+def start_offsets(policy: Policy, seed: int) -> NDArray[np.float64]:
+    """Offsets of the joints at the start [rad], shape (joints,)."""
+    drawn = np.random.default_rng(seed).uniform(-_OFFSET, _OFFSET, len(policy.joints))
+    return policy.sign * drawn
 
 
 def _joint(model: mujoco.MjModel, name: str) -> int:

@@ -323,9 +323,10 @@ def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
     found = []
     for name in shipped.designs():
         design = spec.resolve(name)
-        robot = legged_robot(design)
+        model = design.build()
+        robot = legged_robot(design, model)
         policy = shipped.policy(name, skill)
-        region = Region.of(robot.name, [features(robot)], policy)
+        region = Region.of(robot.name, [features(robot, model.mujoco)], policy)
         found.append((policy, replace(region, friction=max(_frictions(design).values()))))
     family = shipped.open_policy(shipped.FAMILIES[skill])
     region = Region.of(FAMILY_NAME, family.known, family)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.errors import DraftError
-from draft.learn.policy.controller import Controller
+from draft.learn.policy.controller import Controller, start_offsets
 from draft.learn.policy.validity import Fit
 from draft.learn.task.groups import Episodes
 from draft.model import Model
@@ -177,7 +177,7 @@ class Walk:
 
     def _offset_joints(self) -> None:
         """Offset the joints as `Controller.reset` does, from the home pose of the design."""
-        offsets = self.controller.offsets(self._seed)
+        offsets = start_offsets(self.fit.policy, self._seed)
         self.data.qpos[self.controller.positions] += offsets
 
     def _depth(self) -> float:

@@ -1,0 +1,372 @@
+"""Numbers and files of a design change in its page, with the messages that Draft has elsewhere."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks import browser as chromium
+from draft.browser import live, pyodide
+from draft.browser.designer import Designer, source
+from draft.browser.page import page
+from draft.design.references import open_design
+from draft.errors import DraftError
+from draft.learn.policy.walk import plane_xml
+from draft.serving.messages import MOST, MessageServer
+
+pytest.importorskip("mjswan", reason="needs the extra page")
+
+Open = Callable[..., Any]
+
+
+def message(reference: str = "cheetah", **more: Any) -> str:
+    own = source(open_design(reference))
+    asked = {"id": 3, "files": own["files"], "values": own["values"], "title": "t", "color": "#000"}
+    return json.dumps(asked | more)
+
+
+def answer(text: str) -> dict[str, Any]:
+    return json.loads(Designer("walk").answer(text))
+
+
+def test_a_message_is_answered_by_the_robot_with_its_verdict_and_its_text() -> None:
+    values = {"thigh_length": 0.3}
+    found = answer(message("quadruped", values=values))
+    design = open_design("quadruped").spec.resolve(values)
+    assert found["id"] == 3
+    assert found["robot"]["xml"] == plane_xml(design.build())
+    assert found["robot"]["said"]["accepted"]
+    assert next(one for one in found["fields"] if one["name"] == "thigh_length")["text"] == "0.3"
+    known = message("quadruped", values=values, known=[found["robot"]["network"]])
+    assert "network" in found
+    assert "network" not in answer(known)
+
+
+def test_a_refused_design_is_a_robot_with_its_findings() -> None:
+    found = answer(message(values={"actuators.leg.peak_torque": 1}))["robot"]["said"]
+    assert not found["accepted"]
+    assert ["error", "cannot_stand"] in [one[:2] for one in found["findings"]]
+
+
+def test_fields_are_all_parameters_and_what_actuators_state() -> None:
+    design = open_design("quadruped")
+    found = {one["name"]: one["text"] for one in answer(message("quadruped"))["fields"]}
+    assert {*design.spec.parameters} < {*found}
+    assert found["shank_radius"] == "0.8 * thigh_radius"
+    for quantity in design.spec.actuators["leg"].stated:
+        assert f"actuators.leg.{quantity}" in found
+
+
+@pytest.mark.parametrize(
+    ("asked", "cause"),
+    [
+        ("", "the page sent a message that cannot be read: it: Invalid JSON"),
+        ("[]", "the page sent a message that cannot be read"),
+        (message(values=[1]), "the page sent a message that cannot be read: values"),
+        (message(more=1), "the page sent a message that cannot be read: more"),
+        (message(values={"thigh": 1}), "'thigh' is not a parameter"),
+        (message(values={"thigh_length": 3}), "thigh_length = 3 m is outside its range"),
+        (message(values={"thigh_length": "1 +"}), "thigh_length"),
+        (message(files={}), "file not found"),
+        (message(files={"../tree.yaml": ""}), "file not found"),
+        (
+            message(files={"parameters.yaml": "a: [", "tree.yaml": ""}),
+            "parameters.yaml:2:1 not valid YAML",
+        ),
+    ],
+)
+def test_what_is_wrong_is_an_answer(asked: str, cause: str) -> None:
+    (problem, *_) = answer(asked)["problems"]
+    assert cause in f"{problem['where']} {problem['cause']}"
+
+
+def test_files_of_messages_are_never_read_from_the_disk(tmp_path: Path) -> None:
+    secret = tmp_path / "laws.yaml"
+    secret.write_text("key: kept to myself")
+    files = source(open_design("cheetah"))["files"]
+    files["parameters.yaml"] += f"\ntrends: {secret}\n"
+    (problem, *_) = answer(message(files=files))["problems"]
+    assert "kept to myself" not in str(problem)
+
+
+@pytest.fixture
+def server() -> Iterator[MessageServer]:
+    made = MessageServer({"index.html": b"page", "a.js": b"1"}, "/designer", lambda text: "[]")
+    yield made
+    made.close()
+
+
+def request(server: MessageServer, method: str, path: str, **headers: str) -> tuple[int, bytes]:
+    body = headers.pop("body", None)
+    connection = http.client.HTTPConnection("127.0.0.1", server.port)
+    connection.request(method, path, body, {k.replace("_", "-"): v for k, v in headers.items()})
+    found = connection.getresponse()
+    content = found.read()
+    connection.close()
+    return found.status, content
+
+
+JSON = {"Content_Type": "application/json", "body": "{}"}
+
+
+def test_a_server_has_its_files_and_answers_messages(server: MessageServer) -> None:
+    assert request(server, "GET", "/") == (200, b"page")
+    assert request(server, "GET", "/a.js?x=1") == (200, b"1")
+    assert request(server, "POST", "/designer", **JSON) == (200, b"[]")
+
+
+@pytest.mark.parametrize("path", ["/../../etc/passwd", "/%2e%2e/a", "/b.js", "/designer"])
+def test_a_server_has_no_other_files(server: MessageServer, path: str) -> None:
+    assert request(server, "GET", path)[0] == 404
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Host": "evil.example"}, 403),
+        ({"Origin": "http://evil.example"}, 403),
+        ({"Origin": "null"}, 403),
+        ({"Content_Type": "text/plain"}, 400),
+        ({"Content_Length": "-1"}, 400),
+        ({"Content_Length": str(MOST + 1)}, 413),
+    ],
+)
+def test_other_sites_and_odd_messages_are_refused(
+    server: MessageServer, headers: dict[str, str], status: int
+) -> None:
+    assert request(server, "POST", "/designer", **{**JSON, **headers})[0] == status
+
+
+def test_a_fault_of_draft_is_an_answer_and_its_server_stays(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail(text: bytes) -> str:
+        raise RuntimeError("a fault")
+
+    server = MessageServer({}, "/designer", fail)
+    status, content = request(server, "POST", "/designer", **JSON)
+    assert (status, content[:12]) == (500, b"Draft failed")
+    assert "RuntimeError: a fault" in capsys.readouterr().err
+    assert request(server, "POST", "/designer", **JSON)[0] == 500
+    server.close()
+
+
+def test_a_port_that_is_taken_is_said(server: MessageServer) -> None:
+    with pytest.raises(DraftError, match="another page or program uses it"):
+        MessageServer({}, "/designer", lambda text: "", server.port)
+
+
+@pytest.mark.parametrize(
+    ("options", "cause"),
+    [
+        ({"live": True, "python": True}, "`live` and `python` both let a page change designs"),
+        ({"live": True, "single": True}, "a page of one file changes no designs"),
+        ({"python": True, "policies": ["a.onnx"]}, "has the policies that ship alone"),
+    ],
+)
+def test_pages_without_room_for_a_designer_say_so(
+    options: dict[str, Any], cause: str, tmp_path: Path
+) -> None:
+    with pytest.raises(DraftError, match=re.escape(cause)):
+        page(["cheetah"], tmp_path / "page", **options)
+    assert not (tmp_path / "page").exists()
+
+
+@pytest.fixture
+def opened(browser: Any, tmp_path: Path) -> Iterator[Open]:
+    """Opens a live page of some designs; its tab has what it asked for as `asked`."""
+    servers: list[MessageServer] = []
+    tabs: list[Any] = []
+
+    def open_(*designs: str, **options: Any) -> Any:
+        servers.append(live.serve(page(designs, tmp_path / "page", live=True, **options)))
+        tab = chromium.tab(browser, viewport={"width": 1280, "height": 900})
+        tabs.append(tab)
+        tab.faults, tab.asked, tab.server = [], [], servers[-1]
+        tab.on("pageerror", lambda error: tab.faults.append(str(error)))
+        tab.on("request", lambda request: tab.asked.append(request.url))
+        tab.goto(f"http://127.0.0.1:{servers[-1].port}/#forward=0.5")
+        tab.wait_for_function("window.draftPage")
+        tab.click("#design > summary")
+        return tab
+
+    yield open_
+    for tab in tabs:
+        tab.context.close()
+    for server in servers:
+        server.close()
+
+
+def put(tab: Any, name: str, text: str) -> None:
+    field = tab.locator(f"[data-name='{name}']")
+    field.fill(text)
+    field.press("Enter")
+
+
+def settle(tab: Any, problems: bool = False) -> None:
+    """Wait for an answer, of a robot or of problems."""
+    shown = "document.getElementById('design-problems').children.length > 0"
+    tab.wait_for_function(f"!draftPage.designer.busy && {shown} === {json.dumps(problems)}")
+
+
+def mass(tab: Any) -> float:
+    return float(tab.inner_text("#mass").split()[0])
+
+
+@pytest.mark.slow
+def test_any_number_of_any_robot_changes_while_it_walks(opened: Open) -> None:
+    tab = opened("cheetah", "arm")
+    tab.wait_for_function("draftPage.robots[0].qpos[0] > 0.2")
+    light, before = mass(tab), tab.evaluate("draftPage.robots[0].qpos[0]")
+    put(tab, "thigh_length", "0.3")
+    settle(tab)
+    values = {**open_design("cheetah").values, "thigh_length": 0.3}
+    assert mass(tab) == pytest.approx(open_design("cheetah").spec.resolve(values).mass, abs=0.005)
+    assert mass(tab) > light
+    assert tab.evaluate("draftPage.robots[0].qpos[0]") >= before
+    assert tab.evaluate("draftPage.robots[0].falls") == 0
+    assert tab.inner_text("#design-changed") == "--set thigh_length=0.3"
+    put(tab, "thigh_length", "shank_length * 1.1")  # An expression.
+    settle(tab)
+    assert "shank_length * 1.1" in tab.inner_text("#design-changed")
+    tab.click("#robots button:nth-child(2)")
+    put(tab, "upper_arm_length", "0.5")
+    settle(tab)
+    assert "upper_arm_length=0.5" in tab.inner_text("#design-changed")
+    assert tab.faults == []
+    own = f"http://127.0.0.1:{tab.server.port}/"
+    assert all(url.startswith((own, "data:")) for url in tab.asked)
+
+
+@pytest.mark.slow
+def test_a_number_that_gives_no_robot_is_said_and_the_robot_stays(opened: Open) -> None:
+    tab = opened("cheetah")
+    light = mass(tab)
+    put(tab, "thigh_length", "3")
+    settle(tab, problems=True)
+    said = tab.inner_text("#design-problems")
+    assert "thigh_length = 3 m is outside its range [0.1, 0.9]" in said
+    assert "parameters.yaml:7:3" in said
+    assert mass(tab) == light
+    put(tab, "thigh_length", "<img src=x onerror=alert(1)>")
+    settle(tab, problems=True)
+    assert tab.locator("#design img").count() == 0
+    put(tab, "thigh_length", "0.25")
+    settle(tab)
+    put(tab, "actuators.leg.peak_torque", "1")
+    settle(tab)
+    assert tab.inner_text("#verdict") == "It could not be built:"
+    assert "cannot stand" in tab.inner_text("#findings")
+    assert tab.faults == []
+
+
+@pytest.mark.slow
+def test_letters_in_a_field_do_not_steer(opened: Open) -> None:
+    tab = opened("cheetah")
+    command = tab.evaluate("draftPage.steering.command")
+    tab.locator("[data-name=thigh_length]").focus()
+    tab.keyboard.type("w a s d q e p")
+    assert tab.evaluate("draftPage.steering.command") == command
+    assert tab.locator("[data-name=thigh_length]").input_value().endswith("w a s d q e p")
+
+
+@pytest.mark.slow
+def test_files_are_edited_and_a_robot_of_ones_own_is_dropped_in(
+    opened: Open, tmp_path: Path
+) -> None:
+    tab = opened("cheetah")
+    tab.click("#design-fields summary")
+    tab.select_option("#design-file", "tree.yaml")
+    text = tab.input_value("#design-text")
+    tab.fill("#design-text", text.replace("type", "typ", 1))
+    tab.click("#design-apply")
+    settle(tab, problems=True)
+    assert re.search(r"tree\.yaml:\d+:\d+ unknown key 'typ'", tab.inner_text("#design-problems"))
+    assert tab.locator("#design-problems").is_visible()
+    tab.click("#design-back")
+    settle(tab)
+    folder = open_design("hexapod").spec.folder
+    assert folder is not None
+    own = [str(folder / f"{name}.yaml") for name in ("parameters", "tree", "root")]
+    tab.set_input_files("#design-open", own)
+    tab.wait_for_function("draftPage.robots[0].policy?.joints.length === 18")
+    settle(tab)
+    assert tab.inner_text("#name") == "hexapod"
+    tab.wait_for_function("draftPage.robots[0].qpos[0] > 0.05")
+    other = tmp_path / "thesis.tex"
+    other.write_text("years of work")
+    tab.set_input_files("#design-open", str(other))
+    settle(tab, problems=True)
+    assert "a robot has no such file" in tab.inner_text("#design-problems")
+    assert tab.faults == []
+
+
+@pytest.mark.slow
+def test_sliders_of_the_page_and_fields_are_of_one_robot(opened: Open) -> None:
+    tab = opened("cheetah", vary=("thigh_length=0.22:0.3",))
+    put(tab, "shank_length", "0.26")
+    settle(tab)
+    assert tab.inner_text("#design-changed") == "--set shank_length=0.26"
+    tab.locator("[id=thigh_length]").focus()
+    tab.keyboard.press("End")
+    settle(tab)
+    values = {**open_design("cheetah").values, "thigh_length": 0.3, "shank_length": 0.26}
+    assert mass(tab) == pytest.approx(open_design("cheetah").spec.resolve(values).mass, abs=0.005)
+    put(tab, "thigh_length", "0.24")
+    settle(tab)
+    assert float(tab.input_value("[id=thigh_length]")) == 0.24
+    assert tab.faults == []
+
+
+@pytest.mark.slow
+def test_a_page_whose_process_has_ended_says_so(opened: Open) -> None:
+    tab = opened("cheetah")
+    tab.server.close()
+    put(tab, "thigh_length", "0.3")
+    settle(tab, problems=True)
+    assert "The process of this page has ended" in tab.inner_text("#design-problems")
+
+
+@pytest.mark.slow
+def test_python_is_asked_for_by_its_button_alone_and_a_page_without_it_stays(
+    browser: Any, tmp_path: Path
+) -> None:
+    written = page(["cheetah"], tmp_path / "page", python=True)
+    files = {path.name: path.read_bytes() for path in written}
+    server = MessageServer(files, "/none", lambda text: "")
+    tab = chromium.tab(browser)
+    outside: list[str] = []
+
+    def answer_outside(route: Any) -> None:
+        outside.append(route.request.url)
+        # Another file than that of the hash, as of a host that has been broken into.
+        route.fulfill(body="postMessage(1)", headers={"Access-Control-Allow-Origin": "*"})
+
+    tab.context.route(lambda url: not url.startswith("http://127.0.0.1"), answer_outside)
+    tab.goto(f"http://127.0.0.1:{server.port}/")
+    tab.wait_for_function("window.draftPage?.count.simulated > 0.2")
+    tab.click("#design > summary")
+    assert tab.locator("[data-name=thigh_length]").is_disabled()
+    assert outside == []
+    tab.click("#design-start")
+    settle(tab, problems=True)
+    assert "is not the file that this page was written for" in tab.inner_text("#design-problems")
+    assert {url.rpartition("/")[0] + "/" for url in outside} == {pyodide.OWN}
+    assert tab.locator("#design-start").is_enabled()
+    before = tab.evaluate("draftPage.count.simulated")
+    tab.wait_for_function(f"draftPage.count.simulated > {before}")
+    tab.context.close()
+    server.close()
+
+
+def test_a_page_without_a_designer_holds_no_files(tmp_path: Path) -> None:
+    page(["cheetah"], tmp_path / "page")
+    text = (tmp_path / "page" / "index.html").read_text("utf-8")
+    assert '"source"' not in text
+    assert '<details id="design" hidden>' in text
