@@ -59,6 +59,7 @@ BELOW: dict[str, set[str]] = {
         *("laws", "spec", "design", "model", "metrics", "variation", "explore", "learn"),
         "reporting",
     },
+    "deployment": {"laws", "spec", "design", "model", "metrics", "variation", "learn"},
     "studio": {
         *("laws", "spec", "design", "model", "metrics", "explore", "learn"),
         *("reporting", "serving"),
@@ -78,6 +79,7 @@ BELOW: dict[str, set[str]] = {
             "explore",
             "reporting",
             "browser",
+            "deployment",
             "studio",
             "learn",
             "study",

@@ -64,8 +64,8 @@ class Policy:
         scan_points: points of the height scan in the trunk's heading frame, forwards and to the
             left [m], shape (points, 2); none if the policy does not observe the ground.
         scan_range: range of the scan, and divisor of its heights [m].
-        forward: largest |vx| that was commanded in training [m/s]; of a family, the mean over its
-            bodies.
+        commands: largest |vx|, |vy| [m/s] and |wz| [rad/s] that were commanded in training; of a
+            family, the means over its bodies.
         features: features of the design, for a policy that observes them (`features`),
             shape (features,); () for others.
         known: lower and upper end of each feature of the bodies that the policy was trained with,
@@ -99,7 +99,7 @@ class Policy:
     terms: tuple[tuple[str, int], ...]
     scan_points: Array
     scan_range: float
-    forward: float
+    commands: tuple[float, float, float]
     features: Array
     known: Array
     leg_length: float
@@ -108,6 +108,11 @@ class Policy:
     def __repr__(self) -> str:
         sizes = f"{self.network.size} observations, {len(self.joints)} actions"
         return f"Policy('{self.design}', stage {self.stage}, {sizes})"
+
+    @property
+    def forward(self) -> float:
+        """Largest |vx| that was commanded in training [m/s]."""
+        return self.commands[0]
 
     def __call__(self, observations: ArrayLike) -> NDArray[np.float32]:
         """Return the mean actions.
@@ -283,7 +288,7 @@ def _policy(file: Path, network: Network) -> Policy:
         if scan
         else np.zeros((0, 2)),
         scan_range=float(texts["height_scan_range"]),
-        forward=float(ranges[0][1]),
+        commands=(float(ranges[0][1]), float(ranges[1][1]), float(ranges[2][1])),
         features=numbers("design_features") if DESIGN in names else np.zeros(0),
         known=np.array([numbers("design_features_low"), numbers("design_features_high")])
         if "design_features_low" in texts
