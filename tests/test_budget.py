@@ -19,6 +19,7 @@ BUDGET = {
     "assistant": 620,
     "browser": 810,
     "cli": 5_920,  # `--ros2` of export.
+    "deployment": 900,  # A new package: controllers of a policy.
     "description": 2_330,
     "design": 6_450,
     "explore": 4_730,

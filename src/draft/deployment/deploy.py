@@ -88,7 +88,10 @@ def deploy(
         shipped.check_skill(skill)
         if policy is not None:
             raise DraftError("`skill` is for the policies that ship", "omit `skill`, or `policy`")
-    check_target(folder, {*_COPIED, *_WRITTEN}, "controller")
+    # Whoever runs the controller in Python leaves its bytecode.
+    bytecode = {path.relative_to(folder).as_posix() for path in folder.glob("__pycache__/*.pyc")}
+    known = {*_COPIED, *_WRITTEN, "__pycache__", *bytecode}
+    check_target(folder, known, "controller")
     model = open_design(design).build()
     own = [] if policy is None else [open_any(policy)]
     check_drives(own, model)
@@ -131,7 +134,7 @@ def _robot_of(file: Path) -> str:
 
 def _doubts(policy: Policy, outside: str) -> list[str]:
     """Sentences that whoever runs a policy must know."""
-    found = [outside] if outside else []
+    found = [f"The robot is {outside}."] if outside else []
     if policy.delay[1] < _LEAST_DELAY:
         found.append(
             "This policy was trained without a delay from a measurement to its torque: measure "

@@ -57,7 +57,7 @@ def numbers(policy: Policy, member: LeggedRobot) -> dict[str, Number]:
         "gravity_error": Number(_GRAVITY_ERROR, "1", "largest error of gravity's unit length"),
         "margin": Number(_MARGIN, "rad", "angle beyond its range at which a joint stops"),
         "command": Number(
-            np.array(policy.commands), "m/s, m/s, rad/s", "largest |vx|, |vy| and |wz|"
+            np.array(policy.commands), "m/s, m/s, rad/s", "largest vx, vy and wz, either way"
         ),
         "sign": Number(policy.sign, "1", "-1 where a joint turns the other way than in training"),
         "rolls": Number(policy.rolls, "", "whether a joint drives a wheel, to a speed"),

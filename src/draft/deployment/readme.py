@@ -181,4 +181,4 @@ def _limits(numbers: Mapping[str, Number]) -> Iterator[str]:
     for name in _LIMITS:
         value, unit, doc = numbers[name]
         text = ", ".join(f"{x:.3g}" for x in np.ravel(np.asarray(value, float)))
-        yield f"| `{name}` | {text} {unit} | {doc} |"
+        yield f"| `{name}` | {text} {unit if unit != '1' else ''} | {doc} |"
