@@ -99,7 +99,7 @@ example, compiled in the folder above:
 
     c++ -std=c++17 -O3 -o robot FOLDER/main.cpp && ./robot
 
-or `cmake -S FOLDER -B build && cmake --build build`. In Python, run in this folder:
+or `cmake -S FOLDER -B build && make -C build`. In Python, run in this folder:
 
 ```python
 import time
