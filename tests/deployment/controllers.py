@@ -29,7 +29,7 @@ class Seen(NamedTuple):
     command: Sequence[float]
     velocity: Sequence[float]
     turning: Sequence[float]
-    gravity: Sequence[float]
+    gravity: Sequence[float] | Array
     angle: Array
     speed: Array
 
@@ -45,7 +45,8 @@ class Given(NamedTuple):
 class Deployed(Protocol):
     """A controller in either language."""
 
-    stop: str
+    @property
+    def stop(self) -> str: ...
 
     def start(self, now: float) -> None: ...
     def step(self, seen: Seen) -> Given: ...

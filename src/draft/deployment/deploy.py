@@ -150,5 +150,5 @@ def _archive(table: dict[str, Number], terms: list[str]) -> bytes:
     """Content of `policy.npz`."""
     buffer = io.BytesIO()
     values = {name: np.asarray(number.value) for name, number in table.items()}
-    np.savez_compressed(buffer, terms=np.array(terms), **values)
+    np.savez_compressed(buffer, allow_pickle=False, terms=np.array(terms), **values)
     return buffer.getvalue()
