@@ -26,7 +26,10 @@ SCREEN = "screen bear --vary thigh_length=0.2:0.3 --out s --n"
         ),
         ("import x.urdf --population None", "Expected one of ('humanoid', 'quadruped')."),
         ("export bear --format dxf", "Expected one of ('urdf', 'sdf', 'glb', 'mjcf', 'step')."),
-        ("learn show --recipe lapto", "Expected one of ('paper', 'laptop', 'tune', 'any')."),
+        (
+            "learn show --recipe lapto",
+            "Expected one of ('paper', 'laptop', 'tune', 'any', 'machine').",
+        ),
         ("evaluate r --errors papr", "Expected one of ('twins', 'survey', 'paper')."),
     ],
 )

@@ -19,7 +19,7 @@ SEEN = ("base_ang_vel", "projected_gravity", "joint_pos", "joint_vel", "actions"
 
 
 def policy_file(
-    file: Path, design: Design, terms: Sequence[str] = SEEN, delay: float = 0.0
+    file: Path, design: Design, terms: Sequence[str] = SEEN, delay: float = 0.0, history: int = 1
 ) -> Path:
     """Write a policy with these terms for a design."""
     model, random = design.build(), np.random.default_rng(0)
@@ -28,7 +28,9 @@ def policy_file(
     rolls = np.array(member.rolls or (False,) * count)
     lengths = dict.fromkeys(terms, 3) | {"joint_vel": count, "actions": count}
     lengths |= {"joint_pos": count - int(rolls.sum())}
-    entries = sum(lengths[name] for name in terms)
+    frames = {name: 1 if name == "command" else history for name in terms}
+    lengths = {name: lengths[name] * frames[name] for name in terms}
+    entries = sum(lengths.values())
     sizes = (entries, 24, 16, count)
     layers = [
         (random.normal(0, one**-0.5, (other, one)), random.normal(0, 0.1, other))
@@ -59,6 +61,7 @@ def policy_file(
         contact_time=(0.01, 0.01),
         delay=(0.0, delay),
         terms=tuple((name, lengths[name]) for name in terms),
+        history=tuple(frames.values()),
         scan_points=np.zeros((0, 2)),
         scan_range=1.0,
         commands=(1.0, 0.6, 0.5),

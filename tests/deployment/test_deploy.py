@@ -16,11 +16,14 @@ from draft.deployment.deploy import deploy
 from draft.deployment.observations import TERMS
 from draft.design.references import open_design
 from draft.errors import DraftError, RefusedError
-from draft.learn.policy.policy import FOLDER
+from draft.learn.policy.policy import FOLDER, open_policy
 from draft.learn.policy.reduced import ANY
+from draft.learn.policy.validity import fit
+from draft.learn.policy.walk import Walk
 from tests.commands import Command
 from tests.deployment.conftest import Written
 from tests.deployment.controllers import COMPILER, Compiled, Python, Seen, needs_compiler
+from tests.deployment.machine import Machine
 from tests.deployment.made_policies import SEEN, policy_file
 
 FILES = [
@@ -40,6 +43,39 @@ def test_the_folder_has_the_controller_in_two_languages(written: Written) -> Non
         text = (folder / name).read_text(encoding="utf-8")
         assert "import draft" not in text
         assert not re.search("@[A-Z]", text)
+
+
+@pytest.mark.parametrize("history", [1, 4])
+def test_past_steps_are_observed_as_in_drafts_own_runner(history: int, tmp_path: Path) -> None:
+    design = open_design("cheetah")
+    file = policy_file(tmp_path / "past.onnx", design, SEEN, history=history)
+    found = deploy(file, tmp_path / "past")
+    assert set(found.policy.history) == {history, 1}
+    model = design.build()
+    walk = Walk(model, fit(model, policies=[open_policy(file)]), (0.3, 0.0, 0.0))
+    python = Python(found.folder)
+    machine = Machine(model, walk.fit, python.own.names)
+    others = [Compiled(found.folder)] if COMPILER is not None else []
+    for i in range(12):
+        if i == 8:  # A new start knows no past.
+            for one in (python, *others):
+                one.start(i * 0.02)
+            walk.controller.reset(walk.data)
+            walk.data.qpos[:], walk.data.qvel[:] = machine.data.qpos, machine.data.qvel
+        seen = machine.seen(i * 0.02, (0.3, 0.0, 0.0))
+        step = python.step(seen)
+        expected = walk.controller.observe(walk.data, walk.command)
+        np.testing.assert_allclose(step.observation, expected, atol=1e-4)
+        for other in others:
+            np.testing.assert_allclose(other.step(seen).observation, step.observation, atol=1e-6)
+        for _ in range(4):
+            machine.drive(python.torque(*machine.state(), i * 0.02))
+            walk.controller.step(walk.data, walk.command)
+        assert python.stop == ""
+    text = f"the last {history} steps, the oldest first"
+    assert (text in readme(found.folder)) == (history > 1)
+    for other in others:
+        other.close()
 
 
 @pytest.mark.parametrize(

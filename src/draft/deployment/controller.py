@@ -88,6 +88,7 @@ class Controller:
         n = self.numbers
         self.names: list[str] = n["joint_names"].tolist()
         self.terms: list[str] = n["terms"].tolist()
+        self._history: list[int] = n["history"].tolist()
         self._layers = [
             (n[f"weight_{i}"].astype(float), n[f"bias_{i}"].astype(float))
             for i in range(sum(name.startswith("weight_") for name in n))
@@ -98,7 +99,7 @@ class Controller:
     def start(self, now: float) -> None:
         """Forget the last action and a stop; `step` must follow within the time-out."""
         self.action = np.zeros(len(self.names))
-        self.stop = ""
+        self.stop, self._first = "", True
         self._last = now
 
     def step(self, sensors: Sensors, command: Command, now: float) -> Output:
@@ -118,6 +119,7 @@ class Controller:
             if now - command.time > n["command_timeout"]:
                 asked = np.zeros(3)
             self.observation = self._observe(sensors, np.clip(asked, -n["command"], n["command"]))
+            self._first = False
             action = self.network(self.observation)
             if np.isfinite(action).all():
                 self.action = action
@@ -188,8 +190,15 @@ class Controller:
             "command": command,
             "design": n["design"],
         }
-        found = [np.asarray(parts[name], float) for name in self.terms]
-        return np.concatenate(found).astype(np.float32)
+        found, at = [], 0
+        for name, count in zip(self.terms, self._history, strict=True):
+            now = np.asarray(parts[name], np.float32)
+            end = at + count * len(now)
+            # Past steps of a term come first, the oldest before; at the start there are none.
+            past = self.observation[at + len(now) : end]
+            found += [np.tile(now, count - 1) if self._first else past, now]
+            at = end
+        return np.concatenate(found)
 
     def _reason(self, sensors: Sensors, command: Command, now: float) -> str:
         """Why the robot must stop; "" if it need not."""

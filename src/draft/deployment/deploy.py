@@ -104,8 +104,8 @@ def deploy(
     here = Path(__file__)
     files: dict[str, str | bytes] = {
         **{name: here.with_name(name).read_text(encoding="utf-8") for name in _COPIED},
-        "controller.hpp": header(table, terms),
-        "policy.npz": _archive(table, terms),
+        "controller.hpp": header(table, found.policy),
+        "policy.npz": _archive(table, found.policy),
         "README.md": readme(found, member, model, table, doubts, folder.resolve().name),
     }
     write_folder(folder, files | records(model))
@@ -146,9 +146,13 @@ def _doubts(policy: Policy, outside: str) -> list[str]:
     return found
 
 
-def _archive(table: dict[str, Number], terms: list[str]) -> bytes:
+def _archive(table: dict[str, Number], policy: Policy) -> bytes:
     """Content of `policy.npz`."""
     buffer = io.BytesIO()
     values = {name: np.asarray(number.value) for name, number in table.items()}
-    np.savez_compressed(buffer, allow_pickle=False, terms=np.array(terms), **values)
+    values |= {
+        "terms": np.array([name for name, _ in policy.terms]),
+        "history": np.array(policy.history),
+    }
+    np.savez_compressed(buffer, allow_pickle=False, **values)
     return buffer.getvalue()

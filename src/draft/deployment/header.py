@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from draft.deployment.numbers import Number
 from draft.deployment.observations import TERMS
+from draft.learn.policy.policy import Policy
 
 _PER_LINE = 12
 
 
-def header(numbers: Mapping[str, Number], terms: Sequence[str]) -> str:
+def header(numbers: Mapping[str, Number], policy: Policy) -> str:
     """Text of `controller.hpp`.
 
     Args:
         numbers: numbers of the controller.
-        terms: names of the terms of an observation, in order.
+        policy: the policy, for the terms of its observation.
     """
+    terms = [name for name, _ in policy.terms]
     estimates = [TERMS[name].estimated for name in terms if TERMS[name].estimated]
     words = {
         "NUMBERS": "\n".join(_constants(numbers)),
@@ -30,10 +32,21 @@ def header(numbers: Mapping[str, Number], terms: Sequence[str]) -> str:
             for one in estimates
         ),
         "ESTIMATED_FINITE": "".join(f" ||\n        !detail::finite(s.{x})" for x in estimates),
-        "OBSERVE": "\n".join(f"    {TERMS[name].code}  // {name}" for name in terms),
+        "OBSERVE": "\n".join(_observed(policy)),
     }
     text = Path(__file__).with_name("controller.hpp.in").read_text(encoding="utf-8")
     return re.sub("@([A-Z_]+)@", lambda found: words[found[1]], text)
+
+
+def _observed(policy: Policy) -> Iterator[str]:
+    """Statements that write the terms of an observation."""
+    for (name, length), count in zip(policy.terms, policy.history, strict=True):
+        sizes, past = f"({length // count}, {count});", count > 1
+        if past:
+            yield f"    past{sizes}"
+        yield f"    {TERMS[name].code}  // {name}"
+        if past:
+            yield f"    fill{sizes}"
 
 
 def _constants(numbers: Mapping[str, Number]) -> list[str]:

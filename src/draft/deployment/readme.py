@@ -11,6 +11,7 @@ from draft.deployment.observations import TERMS
 from draft.extras import own_version
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.policy.matching import structure_of
+from draft.learn.policy.policy import Policy
 from draft.learn.policy.validity import Fit
 from draft.model import Model
 
@@ -64,7 +65,7 @@ def readme(
         "## Observation",
         f"The policy acts every {policy.control_period * 1e3:g} ms. The controller computes its "
         "observation from `Sensors` and `Command`, in this order:",
-        "\n".join(_observations(policy.terms)),
+        "\n".join(_observations(policy)),
         "## Joints",
         "All arrays have this order. The axis is in the trunk's frame in the home pose: a positive "
         "angle turns by the right hand about it, in your encoders as in Draft's model. The sign "
@@ -130,14 +131,15 @@ must start."""
     return text
 
 
-def _observations(terms: Sequence[tuple[str, int]]) -> Iterator[str]:
+def _observations(policy: Policy) -> Iterator[str]:
     yield "| entries | term | what it is | unit |"
     yield "|---|---|---|---|"
     first = 0
-    for name, count in terms:
-        term, last = TERMS[name], first + count - 1
-        yield f"| {first} to {last} | `{name}` | {term.meaning} | {term.unit} |"
-        first += count
+    for (name, length), count in zip(policy.terms, policy.history, strict=True):
+        term, last = TERMS[name], first + length - 1
+        past = f"; the last {count} steps, the oldest first" if count > 1 else ""
+        yield f"| {first} to {last} | `{name}` | {term.meaning}{past} | {term.unit} |"
+        first += length
 
 
 def _joints(member: LeggedRobot, model: Model, numbers: Mapping[str, Number]) -> Iterator[str]:

@@ -28,6 +28,7 @@ FAMILY, CLIMBING_FAMILY = FOLDER / "family.onnx", FOLDER / "family_climb.onnx"
 FAMILIES = {"walk": FAMILY, "run": FAMILY, "push": FAMILY, "climb": CLIMBING_FAMILY}
 # The policy of all legs; see `draft.learn.policy.reduced`.
 ANY = FOLDER.parents[1] / "policies" / "any.onnx"
+_HISTORY = "observation_terms_history_length"
 Array = NDArray[np.float64]
 
 
@@ -61,6 +62,8 @@ class Policy:
         contact_time: least and greatest time constant of the feet's contacts in training [s].
         delay: least and greatest delay of the joint targets in training [s].
         terms: names and lengths of the terms of an observation, in order.
+        history: for each term, the number of its last values that are observed, the oldest first
+            and the present one last.
         scan_points: points of the height scan in the trunk's heading frame, forwards and to the
             left [m], shape (points, 2); none if the policy does not observe the ground.
         scan_range: range of the scan, and divisor of its heights [m].
@@ -97,6 +100,7 @@ class Policy:
     contact_time: tuple[float, float]
     delay: tuple[float, float]
     terms: tuple[tuple[str, int], ...]
+    history: tuple[int, ...]
     scan_points: Array
     scan_range: float
     commands: tuple[float, float, float]
@@ -284,6 +288,9 @@ def _policy(file: Path, network: Network) -> Policy:
         contact_time=ends("contact_time", CONTACT_TIME),
         delay=ends("delay", 0.0),
         terms=tuple(zip(names, lengths, strict=True)),
+        history=tuple(max(1, int(n)) for n in texts[_HISTORY].split(","))
+        if _HISTORY in texts
+        else (1,) * len(names),
         scan_points=scan_points([*numbers("height_scan_size")], float(texts["height_scan_pitch"]))
         if scan
         else np.zeros((0, 2)),

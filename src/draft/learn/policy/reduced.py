@@ -171,6 +171,7 @@ class LegsPolicy:
             contact_time=_ends(texts["contact_time"]),
             delay=_ends(texts["delay"]),
             terms=terms,
+            history=(1,) * len(terms),
             scan_points=np.zeros((0, 2)),
             scan_range=1.0,
             commands=(float(most[0]), float(most[1]), float(most[2])),
