@@ -1,10 +1,11 @@
-"""Pictures with numbers for the how-to pages: motors side by side, and an exported URDF."""
+"""Pictures with numbers for the how-to pages: motors, an exported URDF, a swing test."""
 
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -20,6 +21,7 @@ from draft import plotting
 from draft.design.actuators import Actuator
 from draft.model.model import Model
 from draft.model.picture import Exhibit, Pixels, draw
+from draft.spec import load
 from draft.values import scalar
 
 DPI = 200
@@ -136,6 +138,42 @@ def _exported(folder: Path) -> Figure:
     table.set_fontsize(5)
     for cell in table.get_celld().values():
         cell.set_linewidth(0.4)
+    return figure
+
+
+def swing(folder: Path, path: Path) -> None:
+    """Draw a swing test: its record, and the swing of the design and of what was measured.
+
+    Args:
+        folder: folder of the page, with the log and the robot.
+        path: PNG to write.
+    """
+    save(path, partial(_swing, folder))
+
+
+def _swing(folder: Path) -> Figure:
+    xml = re.search(r"<mujoco>.*</mujoco>", (folder / "log_swing.py").read_text(), re.DOTALL)
+    time, angle, _ = np.loadtxt(folder / "swing.csv", delimiter=",", skiprows=1).T
+    figure, ax = plt.subplots(figsize=(WIDTH, 2.6))
+    ax.plot(time, angle, color="0.75", linewidth=3, label="record")
+    spec = load(folder / "dog")
+    for name, design in {"as designed": None, "as measured": "measured"}.items():
+        motor = spec.resolve(design).actuators["leg"]
+        model = mujoco.MjModel.from_xml_string(xml[0] if xml else "")
+        model.dof_armature, model.dof_damping = scalar(motor.armature), scalar(motor.damping)
+        model.dof_frictionloss = scalar(motor.friction_loss)
+        data = mujoco.MjData(model)
+        data.qpos[0] = angle[0]
+        found = []
+        for _ in time:
+            found.append(data.qpos[0])
+            mujoco.mj_step(model, data)
+        text = (
+            f"{name}: {data.model.dof_armature[0]:.3f} kg m², {model.dof_frictionloss[0]:.3f} N m"
+        )
+        ax.plot(time, found, linewidth=0.8, label=f"{text}, {model.dof_damping[0]:.3f} N m s/rad")
+    ax.set(xlabel="time [s]", ylabel="angle from hanging [rad]")
+    ax.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return figure
 
 

@@ -94,6 +94,11 @@ def _machine(folder: Path, path: Path) -> None:
     cad_figure.assembly(folder / "machine", path)
 
 
+def _swing(folder: Path, path: Path) -> None:
+    """Draw the page's swing test."""
+    howto_figures.swing(folder, path)
+
+
 def _padded(folder: Path, path: Path) -> None:
     """Draw the hopper on its ball, and on the pad of the example of an extension."""
     sys.path.insert(0, str(folder / "examples" / "extension"))
@@ -135,6 +140,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "page": _page,
     "ros": _ros,
     "to-a-machine": _machine,
+    "before-you-switch-it-on": _swing,
     "extend": _padded,
 }
 

@@ -40,6 +40,8 @@ SLOW = (
     "learn",
     "study",
     "twins",
+    "deployment/test_controller.py",
+    "deployment/test_deploy.py",
     "cli/test_evaluate.py",
     "cli/test_play.py",
     "cli/test_references.py",

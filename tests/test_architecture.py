@@ -63,6 +63,7 @@ BELOW: dict[str, set[str]] = {
         *("laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"),
         "browser",
     },
+    "deployment": {"laws", "spec", "design", "model", "metrics", "variation", "learn"},
     "studio": {
         *("laws", "spec", "design", "model", "metrics", "explore", "learn"),
         *("reporting", "serving"),
@@ -82,6 +83,7 @@ BELOW: dict[str, set[str]] = {
             "explore",
             "reporting",
             "browser",
+            "deployment",
             "studio",
             "learn",
             "study",

@@ -18,7 +18,8 @@ BUDGET = {
     ".": 2_460,
     "assistant": 620,
     "browser": 1_290,  # The designer of a page, its server, Python in a worker and a thin MuJoCo.
-    "cli": 5_960,  # `--live` and `--python` of pages.
+    "cli": 6_030,  # `--live` and `--python` of pages, and `deploy`.
+    "deployment": 900,  # Controllers of a policy in C++ and Python.
     "description": 2_330,
     "design": 6_450,
     "drawing": 70,
@@ -26,7 +27,7 @@ BUDGET = {
     "fitting": 3_890,
     "imports": 6_560,
     "laws": 2_090,  # The nearest module of the catalogue.
-    "learn": 20_260,
+    "learn": 20_410,  # Policies without a velocity: history, encoders, dry friction.
     "metrics": 3_200,
     "model": 5_180,  # STEP, a bill of materials, SDFormat, and the package for ROS 2.
     "reporting": 1_590,

@@ -31,6 +31,7 @@ NEEDS = {
     "explanation/filter": (),
     "explanation/probabilities": (),
     "howto/arm": (),
+    "howto/before-you-switch-it-on": (),
     "howto/biped": (),
     "howto/explore": ("explore", "figures", "report"),
     "howto/extend": (),

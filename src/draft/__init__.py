@@ -28,6 +28,7 @@ from draft.lazy import on_first_use
 if TYPE_CHECKING:
     from draft import extend, metrics, study
     from draft.browser.page import page
+    from draft.deployment.deploy import deploy
     from draft.design import Design, Finding
     from draft.explore.comparison import compare
     from draft.explore.optimise import optimise
@@ -62,6 +63,7 @@ __all__ = [
     "SpecError",
     "compare",
     "compare_twin",
+    "deploy",
     "evaluate",
     "export",
     "export_ros2",
@@ -92,6 +94,7 @@ _MODULES = {
     "Spec": "draft.spec",
     "compare": "draft.explore.comparison",
     "compare_twin": "draft.twins.compare",
+    "deploy": "draft.deployment.deploy",
     "evaluate": "draft.learn.measuring.evaluation",
     "export": "draft.model.export",
     "export_ros2": "draft.model.export",

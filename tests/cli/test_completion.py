@@ -48,6 +48,7 @@ def offered(completion: Path, *words: str) -> list[str]:
         (("bu",), ["build"]),
         (("sur",), ["surface", "survey"]),
         (("se",), ["sensitivity"]),
+        (("deploy", "--sk"), ["--skill"]),
         (("--v",), ["--version"]),
         (("--install-completion", ""), ["bash", "zsh"]),
         (("show", "b"), ["biped", "bear"]),

@@ -20,10 +20,16 @@ SCREEN = "screen bear --vary thigh_length=0.2:0.3 --out s --n"
             (f"{SCREEN} {n}", f"--n: expected a whole number, not '{n}'")
             for n in ("1.5", "many", "inf", "nan")
         ),
-        ("play cheetah --skill fly", "Expected one of ('walk', 'run', 'climb', 'push')."),
+        *(
+            (f"{word} --skill fly", "Expected one of ('walk', 'run', 'climb', 'push').")
+            for word in ("play cheetah", "deploy cheetah --out x")
+        ),
         ("import x.urdf --population None", "Expected one of ('humanoid', 'quadruped')."),
         ("export bear --format dxf", "Expected one of ('urdf', 'sdf', 'glb', 'mjcf', 'step')."),
-        ("learn show --recipe lapto", "Expected one of ('paper', 'laptop', 'tune', 'any')."),
+        (
+            "learn show --recipe lapto",
+            "Expected one of ('paper', 'laptop', 'tune', 'any', 'machine').",
+        ),
         ("evaluate r --errors papr", "Expected one of ('twins', 'survey', 'paper')."),
     ],
 )

@@ -77,6 +77,8 @@ def driven(models: Sequence[Model], skill: str, policies: Sequence[AnyPolicy]) -
     unknown = [name for name, _ in found[0].policy.terms if name not in TERMS]
     if unknown:
         return Driven((), f"its policy observes {', '.join(unknown)}, which no page computes")
+    if max(found[0].policy.history) > 1:
+        return Driven((), "its policy observes past steps, which no page remembers")
     return Driven(found, "")
 
 

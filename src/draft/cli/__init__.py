@@ -47,6 +47,7 @@ COMMANDS = {
     "surface": "Measure what bodies over a plane of two numbers can do with a trained policy.",
     "learn": "Show every number of the learning tasks, with its source.",
     "play": "Show what a policy can do: as a video, in the browser, or as an ONNX file.",
+    "deploy": "Write the controller of a policy for a real robot, in plain C++ and Python.",
     "trends": "Fit, show, check and draw the actuator trends.",
     "survey": "Read public robot descriptions and fit the structure trends.",
     "schema": "Print or write the JSON Schemas of the files.",

@@ -41,9 +41,9 @@ StageOption = Annotated[
 RecipeOption = Annotated[
     RecipeName | None,
     tyro.conf.arg(
-        metavar="{paper,laptop,tune}",
-        help="Numbers of the tasks: as published, for a hundredth of the steps, or to tune a "
-        "policy that can run.",
+        metavar="{paper,laptop,tune,machine}",
+        help="Numbers of the tasks: as published, for a hundredth of the steps, to tune a policy "
+        "that can run, or for a real robot.",
         help_behavior_hint="(default: laptop on a CPU, paper on a GPU)",
     ),
 ]

@@ -59,11 +59,21 @@ def test_slices_add_up_to_one_long_run_bit_by_bit(long: Any, tmp_path: Path, eng
 
 
 FAMILY = plan("cheetah", "bear", stage="terrain")
+REMEMBERS = plan(
+    "cheetah",
+    "bear",
+    ground="flat",
+    values={"observations.history": 3, "observations.linear_velocity": False},
+)
 SYMMETRIC = plan(stage="velocity", values={"learning.mirror": True, "velocity.growth": 0.5})
 
 
 @missing
-@pytest.mark.parametrize("of", [FAMILY, SYMMETRIC], ids=["family on terrain", "symmetric"])
+@pytest.mark.parametrize(
+    "of",
+    [FAMILY, SYMMETRIC, REMEMBERS],
+    ids=["family on terrain", "symmetric", "past steps"],
+)
 def test_slices_add_up_on_native_mujoco(tmp_path: Path, of: Plan) -> None:
     whole = train(begin(tmp_path / "whole", of), 3, engine="native")
     sliced = train(begin(tmp_path / "sliced", of), 1, 3, engine="native")

@@ -236,6 +236,8 @@ def config_of(policy: Policy) -> Config:
     changed: dict[str, object] = {
         "episodes.contact_time": policy.contact_time,
         "episodes.delay": policy.delay,
+        "observations.linear_velocity": "base_lin_vel" in dict(policy.terms),
+        "observations.history": max(policy.history),
     }
     for name, value in own.items():
         group, _, number = name.partition(".")

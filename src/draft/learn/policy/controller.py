@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -56,6 +56,7 @@ class Controller:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
         self._decimation = round(policy.control_period / policy.timestep)
         self._action = np.zeros(len(policy.joints))
+        self._past: list[Mapping[str, NDArray[np.float64]]] = []  # Terms of the last steps.
         self._since = 0
         # Rays use a copy in which the robot's own geoms have a group of their own.
         self._sight = copy.copy(model)
@@ -77,6 +78,7 @@ class Controller:
     def resume(self, other: Controller) -> None:
         """Continue where another controller of the same joints stopped."""
         self._action, self._since = other._action.copy(), other._since
+        self._past = list(other._past)
 
     def reset(self, data: mujoco.MjData, seed: int = 0) -> None:
         """Put the robot near its home pose, at the model's first keyframe if it has one.
@@ -93,7 +95,7 @@ class Controller:
         else:
             mujoco.mj_resetData(self.model, data)
         data.qpos[self._q] = self.policy.home + start_offsets(self.policy, seed)
-        self._action[:] = 0.0
+        self._action, self._past = np.zeros_like(self._action), []
         self._since = 0
         mujoco.mj_forward(self.model, data)
 
@@ -108,7 +110,10 @@ class Controller:
             DraftError: the simulation or the policy gives values that are not finite.
         """
         if self._since == 0:
-            self._action = self.policy(self.observe(data, command)).astype(float)
+            parts = self._parts(data, command)
+            self._action = self.policy(self._joined(parts)).astype(float)
+            steps = [*self._past, parts]
+            self._past = steps[max(0, len(steps) + 1 - max(self.policy.history)) :]
             if not np.isfinite(self._action).all():
                 cause = "the policy or the simulation gives values that are not finite"
                 raise DraftError(cause, "restart from another state")
@@ -128,13 +133,26 @@ class Controller:
         Returns:
             Terms of `Policy.terms` in order, shape (n,).
         """
+        return self._joined(self._parts(data, command))
+
+    def _joined(self, parts: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float32]:
+        """Observation of the terms of now and those of the steps before; at first of now alone."""
+        found, most = [], max(self.policy.history)
+        steps = [*self._past, parts]
+        steps = [*steps[:1] * (most - len(steps)), *steps]
+        for (name, _), count in zip(self.policy.terms, self.policy.history, strict=True):
+            found += [one[name] for one in steps[-count:]]
+        return np.concatenate(found).astype(np.float32)
+
+    def _parts(self, data: mujoco.MjData, command: ArrayLike) -> Mapping[str, NDArray[np.float64]]:
+        """Terms of now."""
         mujoco.mj_forward(self.model, data)
         turn = data.xmat[self._trunk].reshape(3, 3)
         sign = self.policy.sign
         linear, angular = (data.sensordata[at : at + 3] for at in self._sensors)
         parts: dict[str, NDArray[np.float64]] = {
-            "base_lin_vel": linear,
-            "base_ang_vel": angular,
+            "base_lin_vel": linear.copy(),
+            "base_ang_vel": angular.copy(),
             "projected_gravity": -turn[2],
             ANGLES: (sign * (data.qpos[self._q] - self.policy.home))[~self.policy.rolls],
             "joint_vel": sign * data.qvel[self._v],
@@ -144,7 +162,7 @@ class Controller:
         }
         if len(self.policy.scan_points):
             parts["height_scan"] = self._scan(data, turn) / self.policy.scan_range
-        return np.concatenate([parts[name] for name, _ in self.policy.terms]).astype(np.float32)
+        return parts
 
     def velocity(self, data: mujoco.MjData) -> NDArray[np.float64]:
         """Velocity of the trunk in its own frame, as last observed [m/s], shape (3,)."""

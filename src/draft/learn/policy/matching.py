@@ -115,17 +115,23 @@ class Match:
         order = np.argsort(self.joints)
         return Match(tuple(order.tolist()), tuple(np.array(self.sign)[order].tolist()))
 
-    def entries(self, term: str, rolls: Sequence[bool]) -> tuple[list[int], list[float]]:
+    def entries(
+        self, term: str, rolls: Sequence[bool], length: int
+    ) -> tuple[list[int], list[float]]:
         """Entries of a term of the design's observation in the order of the policy, and signs.
 
         Args:
             term: one of `OF_JOINTS`.
             rolls: for each joint of the design, whether it drives a wheel; () without wheels.
+            length: number of entries: with a history, a multiple of those of one step.
         """
         left_out = {j for j, one in enumerate(rolls) if one} if term == ANGLES else set()
         at = {j: i for i, j in enumerate(sorted({*self.joints} - left_out))}
         chosen = [(at[j], s) for j, s in zip(self.joints, self.sign, strict=True) if j in at]
-        return [i for i, _ in chosen], [sign for _, sign in chosen]
+        steps = range(0, length, len(chosen))
+        return [start + i for start in steps for i, _ in chosen], [s for _, s in chosen] * len(
+            steps
+        )
 
     @property
     def same(self) -> bool:

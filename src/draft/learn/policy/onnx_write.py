@@ -92,6 +92,7 @@ def of_policy(policy: Policy, member: LeggedRobot, commands: Sequence[float]) ->
         "observation_names": names,
         "observation_terms_dim": lengths,
         "observation_terms_scale": [1.0] * len(names),
+        "observation_terms_history_length": [0 if one == 1 else one for one in policy.history],
         "command_names": "twist",
         "command_ranges": [(-most, most) for most in commands],
         "height_scan_size": (0.0, 0.0),

@@ -28,6 +28,7 @@ FAMILY, CLIMBING_FAMILY = FOLDER / "family.onnx", FOLDER / "family_climb.onnx"
 FAMILIES = {"walk": FAMILY, "run": FAMILY, "push": FAMILY, "climb": CLIMBING_FAMILY}
 # The policy of all legs; see `draft.learn.policy.reduced`.
 ANY = FOLDER.parents[1] / "policies" / "any.onnx"
+_HISTORY = "observation_terms_history_length"
 Array = NDArray[np.float64]
 
 
@@ -61,11 +62,13 @@ class Policy:
         contact_time: least and greatest time constant of the feet's contacts in training [s].
         delay: least and greatest delay of the joint targets in training [s].
         terms: names and lengths of the terms of an observation, in order.
+        history: for each term, the number of its last values that are observed, the oldest first
+            and the present one last.
         scan_points: points of the height scan in the trunk's heading frame, forwards and to the
             left [m], shape (points, 2); none if the policy does not observe the ground.
         scan_range: range of the scan, and divisor of its heights [m].
-        forward: largest |vx| that was commanded in training [m/s]; of a family, the mean over its
-            bodies.
+        commands: largest |vx|, |vy| [m/s] and |wz| [rad/s] that were commanded in training; of a
+            family, the means over its bodies.
         features: features of the design, for a policy that observes them (`features`),
             shape (features,); () for others.
         known: lower and upper end of each feature of the bodies that the policy was trained with,
@@ -97,9 +100,10 @@ class Policy:
     contact_time: tuple[float, float]
     delay: tuple[float, float]
     terms: tuple[tuple[str, int], ...]
+    history: tuple[int, ...]
     scan_points: Array
     scan_range: float
-    forward: float
+    commands: tuple[float, float, float]
     features: Array
     known: Array
     leg_length: float
@@ -108,6 +112,11 @@ class Policy:
     def __repr__(self) -> str:
         sizes = f"{self.network.size} observations, {len(self.joints)} actions"
         return f"Policy('{self.design}', stage {self.stage}, {sizes})"
+
+    @property
+    def forward(self) -> float:
+        """Largest |vx| that was commanded in training [m/s]."""
+        return self.commands[0]
 
     def __call__(self, observations: ArrayLike) -> NDArray[np.float32]:
         """Return the mean actions.
@@ -279,11 +288,14 @@ def _policy(file: Path, network: Network) -> Policy:
         contact_time=ends("contact_time", CONTACT_TIME),
         delay=ends("delay", 0.0),
         terms=tuple(zip(names, lengths, strict=True)),
+        history=tuple(max(1, int(n)) for n in texts[_HISTORY].split(","))
+        if _HISTORY in texts
+        else (1,) * len(names),
         scan_points=scan_points([*numbers("height_scan_size")], float(texts["height_scan_pitch"]))
         if scan
         else np.zeros((0, 2)),
         scan_range=float(texts["height_scan_range"]),
-        forward=float(ranges[0][1]),
+        commands=(float(ranges[0][1]), float(ranges[1][1]), float(ranges[2][1])),
         features=numbers("design_features") if DESIGN in names else np.zeros(0),
         known=np.array([numbers("design_features_low"), numbers("design_features_high")])
         if "design_features_low" in texts

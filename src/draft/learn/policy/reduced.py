@@ -144,7 +144,7 @@ class LegsPolicy:
             *(("base_lin_vel", 3), ("base_ang_vel", 3), ("projected_gravity", 3)),
             *(("joint_pos", count), ("joint_vel", count), ("actions", count), ("command", 3)),
         )
-        peak = np.array(member.peak_torque)
+        peak, most = np.array(member.peak_torque), self.commands_for(member)
         timestep = float(texts["physics_timestep"])
         return Policy(
             file=self.file,
@@ -171,9 +171,10 @@ class LegsPolicy:
             contact_time=_ends(texts["contact_time"]),
             delay=_ends(texts["delay"]),
             terms=terms,
+            history=(1,) * len(terms),
             scan_points=np.zeros((0, 2)),
             scan_range=1.0,
-            forward=float(self.commands_for(member)[0]),
+            commands=(float(most[0]), float(most[1]), float(most[2])),
             features=np.zeros(0),
             known=np.zeros((2, 0)),
             leg_length=member.leg_length,

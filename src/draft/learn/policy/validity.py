@@ -197,7 +197,8 @@ def _by_slots(legs: LegsPolicy, name: str, model: Model, member: LeggedRobot, sk
 def _slow(policy: Policy, member: LeggedRobot) -> Policy:
     """Policy that is asked to walk."""
     slow = scaled(LAPTOP.config.commands, "forward").at(member.scale)
-    return replace(policy, forward=min(policy.forward, slow))
+    forward, *others = policy.commands
+    return replace(policy, commands=(min(forward, slow), *others))
 
 
 def check_drives(policies: Sequence[AnyPolicy], model: Model) -> None:

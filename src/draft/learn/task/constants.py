@@ -59,6 +59,7 @@ ITERATIONS = Within(
     f"from 1 to {MOST_ITERATIONS}",
     lambda values: 1 <= min(values) <= max(values) <= MOST_ITERATIONS,
 )
+FRAMES = Within("from 1 to 20", lambda values: 1 <= min(values) <= max(values) <= 20)
 SHARE = Within("a share, 0 to 1", lambda values: min(values) >= 0 and max(values) <= 1)
 RANGE = Within(
     "a range from 0 or more, the smaller number first", lambda values: 0 <= values[0] <= values[-1]

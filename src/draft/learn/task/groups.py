@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from draft.learn.task.constants import (
     ANY,
     CONTACT_TIME,
+    FRAMES,
     ITERATIONS,
     POSITIVE,
     POSITIVE_RANGE,
@@ -73,6 +74,22 @@ class Actuation:
 class Observations:
     """Observations of the actor and their uniform noise; the critic gets them without."""
 
+    linear_velocity: bool = choice(
+        True,
+        "1",
+        "the actor observes the trunk's velocity, which no sensor of a robot gives",
+        DRAFT,
+    )
+    history: int = choice(
+        1,
+        "1",
+        "steps of gyro, gravity, joints and actions that the actor observes, the present included",
+        DRAFT,
+        within=FRAMES,
+    )
+    biased_encoders: bool = choice(
+        False, "1", "observed joint positions have the bias of their encoders", DRAFT
+    )
     linear_velocity_noise: float = choice(0.5, "m/s", "noise of the velocimeter", MJLAB)
     angular_velocity_noise: float = choice(0.2, "rad/s", "noise of the gyro", MJLAB)
     gravity_noise: float = choice(0.05, "1", "noise of the projected gravity", MJLAB)
@@ -206,6 +223,9 @@ class Episodes:
         "viscous friction of each joint at its no-load speed, per peak torque",
         DRAFT,
         within=RANGE,
+    )
+    dry_friction: Range = choice(
+        (0.0, 0.0), "1", "dry friction of each joint, per peak torque", DRAFT, within=RANGE
     )
     centre: float = choice(
         0.02, "m", "largest shift of the trunk's centre of mass per axis", CODE, 1.0

@@ -3,7 +3,8 @@
 `paper` is the published configuration, for a GPU: some hundred million steps per stage. `laptop`
 learns from a hundredth of them; it changes only the numbers below, each for the reason given.
 `tune` is `laptop` for policies that can run already, such as that of a family with one more body.
-`any` trains one policy for robots of any legs.
+`any` trains one policy for robots of any legs. `machine` is `laptop` for policies of real robots:
+they observe what an inertial sensor and encoders give, and meet a machine that is not the model.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from draft.learn.task.config import Config
 from draft.learn.task.constants import JOINTS, MOST_ITERATIONS
 from draft.learn.task.stages import PUBLISHED, STAGES
 
-RecipeName = Literal["paper", "laptop", "tune", "any"]
+RecipeName = Literal["paper", "laptop", "tune", "any", "machine"]
 
 
 _POWER = 1.5  # Power of the joints with which iterations grow.
@@ -170,7 +171,25 @@ ANY = Recipe(
     },
     LAPTOP.plane,
 )
-RECIPES = {recipe.name: recipe for recipe in (Recipe("paper"), LAPTOP, TUNE, ANY)}
+MACHINE = Recipe(
+    "machine",
+    {
+        **LAPTOP.changes,
+        "observations.linear_velocity": Change(False, "no sensor of a robot gives it"),
+        "observations.history": Change(5, "0.1 s: the velocity, and the machine, show in it"),
+        "observations.biased_encoders": Change(True, "a controller sees what its encoders give"),
+        "episodes.encoder": Change(0.03, "joints that were set by hand"),
+        "episodes.delay": Change((0.0, 0.02), "bus, computer and drives, up to a whole period"),
+        "episodes.motor": Change((0.9, 1.1), "torque constants and gains as they are measured"),
+        "episodes.joint_friction": Change((0.0, 0.04), "gearboxes, cold and warm"),
+        "episodes.dry_friction": Change((0.0, 0.03), "gearboxes, cold and warm"),
+        "learning.iterations_base": Change(400, "it learns to feel its velocity too"),
+        "learning.iterations_velocity": Change(400, "it learns to feel its velocity too"),
+        "learning.iterations_push": Change(400, "it learns to feel its velocity too"),
+    },
+    LAPTOP.plane,
+)
+RECIPES = {recipe.name: recipe for recipe in (Recipe("paper"), LAPTOP, TUNE, ANY, MACHINE)}
 
 
 def default(devices: Sequence[str]) -> Recipe:

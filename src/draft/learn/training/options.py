@@ -61,8 +61,8 @@ class TaskOptions(Settings):
     """Numbers and ground of the tasks, which all trainings of a study share."""
 
     recipe: Annotated[RecipeName | None, Shown(default="laptop on a CPU, paper on a GPU")] = None
-    """Numbers of the task: as published, for a hundredth of the steps, or to tune a policy that can
-    run, such as the one of all quadrupeds that ships."""
+    """Numbers of the task: as published, for a hundredth of the steps, to tune a policy that can
+    run, such as the one of all quadrupeds that ships, or for a real robot."""
     ground: Annotated[Ground | None, Shown(default="the recipe's")] = None
     """Ground to train on; on a plane no heights are observed."""
     envs: Annotated[int | None, Field(ge=1, le=10**6), Shown("N", "the recipe's")] = None

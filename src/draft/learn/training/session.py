@@ -55,8 +55,13 @@ def begin(
     Raises:
         DraftError: the folder holds something else, or cannot be written; there is no run to
             start from, or it has other robots and does not see its design; the policy is to see the
-            features of a design that has none.
+            features of a design that has none, or what no policy of several topologies sees.
     """
+    seen = plan.config.observations
+    if plan.mixed and (seen.history > 1 or not seen.linear_velocity):
+        cause = "a policy of several topologies observes the velocity, and no past steps"
+        remedy = "omit observations.linear_velocity and observations.history, or train one robot"
+        raise DraftError(cause, remedy)
     for member in plan.members:
         if plan.see_design and not plan.mixed and not member.is_quadruped:
             cause = f"{member.name} has no features that a policy could see: it is no quadruped"
@@ -227,7 +232,7 @@ def check_fits(plan: Plan, where: Setting) -> None:
     """
     if where.on_cpu:
         points = plan.config.observations.scan_points() if plan.see_ground else 0
-        seen = 2 * (48 + points) + 24
+        seen = 48 * (1 + plan.config.observations.history) + 2 * points + 24
         steps = plan.config.learning.steps
         machine.check_memory(plan.environments, steps, seen, where.processes)
 

@@ -48,7 +48,7 @@ def matched(
             for name in OF_JOINTS:
                 start, end = spans.get(name, (0, 0))
                 if end > start:
-                    entries, signs = one.entries(name, robot.cfg.members[0].rolls)
+                    entries, signs = one.entries(name, robot.cfg.members[0].rolls, end - start)
                     index[row, start:end] = start + np.array(entries)
                     sign[row, start:end] = signs
         order, signs = (np.array([getattr(m, x) for m in matches]) for x in ("joints", "sign"))

@@ -12,10 +12,12 @@ import numpy as np
 from draft.learn.bodies.legged import by_topology, kind_of
 from draft.learn.engine.machine import NATIVE, cores
 from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SKILL_TESTS, SPEED
+from draft.learn.measuring.policies import config_of
 from draft.learn.measuring.rollout.by_slots import by_slots
 from draft.learn.measuring.rollout.evaluate import Policy, evaluate, exported, trained
 from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.policy.reduced import open_for
+from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
 from draft.learn.task.recipes import ANY
 from draft.learn.task.stages import is_like
@@ -144,10 +146,17 @@ def _origin(run: Run, device: str) -> Maker | None:
         known = open_for(file, plan.members)
         alike = known.stage == plan.stage or (known.stage == ANY.name and plan.stage in _WALKS)
         same = alike and bool(len(known.scan_points)) == plan.see_ground
+        same = same and _seen(config_of(known)) == _seen(plan.config)
         return exported(known, device) if same else None
     first = open_run(source)
     same = first.plan.stage == plan.stage and first.plan.see_ground == plan.see_ground
+    same = same and _seen(first.plan.config) == _seen(plan.config)
     return trained(first, origin.iteration, device) if same else None
+
+
+def _seen(config: Config) -> tuple[bool, int]:
+    """What a policy observes of the trunk's velocity and of past steps."""
+    return config.observations.linear_velocity, config.observations.history
 
 
 def _trial(run: Run, replicas: int) -> Trial:

@@ -17,6 +17,9 @@ from draft.learn.task.world.task import Task
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
+# Terms of the actor that may have a history: what an inertial sensor and encoders give.
+_MEASURED = ("base_ang_vel", "projected_gravity", "joint_pos", "joint_vel", "actions")
+
 
 def joint_velocity(env: ManagerBasedRlEnv, noise: float = 0.0) -> torch.Tensor:
     """Joint velocities [rad/s], shape (worlds, joints).
@@ -73,9 +76,9 @@ def observation_cfgs(task: Task, play: bool) -> dict[str, ObservationGroupCfg]:
             func=envs_mdp.projected_gravity, noise=_noise(numbers.gravity_noise)
         ),
         "joint_pos": ObservationTermCfg(
-            # A biased encoder moves the target of the PD law only, as in the paper.
+            # In the paper a biased encoder moves the target of the PD law only.
             func=envs_mdp.joint_pos_rel,
-            params=of_angles(task.members[0]),
+            params={"biased": numbers.biased_encoders, **of_angles(task.members[0])},
             noise=_noise(numbers.joint_position_noise),
         ),
         "joint_vel": ObservationTermCfg(func=joint_velocity, params=velocity),
@@ -93,6 +96,7 @@ def observation_cfgs(task: Task, play: bool) -> dict[str, ObservationGroupCfg]:
     contact = {"sensor_name": FEET}
     critic = {
         **{name: replace(term, noise=None) for name, term in actor.items()},
+        "joint_pos": replace(actor["joint_pos"], params=of_angles(task.members[0]), noise=None),
         "joint_vel": ObservationTermCfg(func=joint_velocity),
         "foot_height": ObservationTermCfg(func=foot_height),
         "foot_air_time": ObservationTermCfg(func=velocity_mdp.foot_air_time, params=contact),
@@ -101,6 +105,10 @@ def observation_cfgs(task: Task, play: bool) -> dict[str, ObservationGroupCfg]:
             func=velocity_mdp.foot_contact_forces, params=contact
         ),
     }
+    if not numbers.linear_velocity:
+        del actor["base_lin_vel"]
+    for name in _MEASURED if numbers.history > 1 else ():
+        actor[name] = replace(actor[name], history_length=numbers.history)
     return {
         "actor": ObservationGroupCfg(terms=actor, enable_corruption=not play),
         "critic": ObservationGroupCfg(terms=critic, enable_corruption=False),

@@ -14,7 +14,8 @@ from draft.learn.task.world.access import robot_of
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
-STREAM = 0x30705  # Of random numbers: these errors change nothing else that a seed draws.
+# Of random numbers: these errors change nothing else that a seed draws.
+STREAM, DRY_STREAM = 0x30705, 0xD12
 
 
 @requires_model_fields("geom_solref")
@@ -63,6 +64,35 @@ class MotorErrors:
         damping[:, at] = usual[..., at].to(damping.dtype) + added
 
 
+class DryFriction:
+    """Dry friction of joints of each world, beside that of its design.
+
+    Parameter of the term: `within`, range of the friction torque per peak torque.
+    """
+
+    model_fields = ("dof_frictionloss",)  # mjlab gives each world its own.
+
+    def __init__(self, cfg: EventTermCfg, env: ManagerBasedRlEnv) -> None:
+        self._env, self._robot = env, robot_of(env)
+        seed = env.cfg.seed
+        rng = np.random.default_rng(None if seed is None else (DRY_STREAM, seed))
+        drawn = rng.uniform(*cfg.params["within"], self._robot.peak_torque.shape)
+        self._share = torch.tensor(drawn, dtype=torch.float32, device=env.device)
+
+    def __call__(self, env: ManagerBasedRlEnv, env_ids: torch.Tensor | None, within: Range) -> None:
+        """Give all worlds their friction; it stays."""
+        self.rescale()
+
+    def rescale(self) -> None:
+        """Set the friction of the joints from the motors of each world's design."""
+        robot, env = self._robot, self._env
+        at = robot.indexing.joint_v_adr
+        friction = _model(env).dof_frictionloss
+        usual = env.sim.get_default_field("dof_frictionloss")
+        own = usual[..., at].to(friction.dtype)
+        friction[:, at] = own + self._share * robot.peak_torque
+
+
 def physics_errors(numbers: Episodes) -> dict[str, EventTermCfg]:
     """Configurations of the events by name, without those that change nothing."""
     usual, terms = Episodes(), {}
@@ -72,6 +102,9 @@ def physics_errors(numbers: Episodes) -> dict[str, EventTermCfg]:
     if (numbers.motor, numbers.joint_friction) != (usual.motor, usual.joint_friction):
         params = {"motor": numbers.motor, "friction": numbers.joint_friction}
         terms["motor_errors"] = EventTermCfg(func=MotorErrors, mode="startup", params=params)
+    if numbers.dry_friction != usual.dry_friction:
+        params = {"within": numbers.dry_friction}
+        terms["dry_friction"] = EventTermCfg(func=DryFriction, mode="startup", params=params)
     return terms
 
 

@@ -59,6 +59,8 @@ def flips(env: ManagerBasedRlEnv) -> dict[str, Flip]:
         pieces = []
         for name, dims in zip(names, manager.group_obs_term_dim[group], strict=True):
             piece = _part(parts, name)
+            past = manager.get_term_cfg(group, name).history_length or 1
+            piece = [(len(piece) * k + i, sign) for k in range(past) for i, sign in piece]
             if dims != (len(piece),):
                 raise _unknown(name, f"it has shape {tuple(dims)}, not ({len(piece)},)", [])
             pieces.append(piece)

@@ -45,6 +45,7 @@ def capture(env: ManagerBasedRlEnv) -> dict[str, Any]:
         "designs": designs,
         "defaults": defaults,
         "tensors": {path: tensor.clone() for path, tensor in _tensors(env)},
+        "newest": {name: one._pointer for name, one in _histories(env)},
         "steps": env.common_step_counter,
         "physics_steps": env._sim_step_counter,
         "random": _random_state(torch.device(env.device)),
@@ -82,6 +83,8 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
         for path, tensor in tensors.items():
             tensor.copy_(saved[path])
     _wait(env)
+    for name, one in _histories(env):
+        one._pointer = state["newest"][name]
     env.common_step_counter = state["steps"]
     env._sim_step_counter = state["physics_steps"]
     warm = tensors[_WHOLE] if whole else _sim_tensor(env, "qacc_warmstart")
@@ -90,6 +93,13 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
     warm.copy_(kept)
     _wait(env)
     _set_random_state(state["random"], torch.device(env.device))
+
+
+def _histories(env: ManagerBasedRlEnv) -> Iterator[tuple[str, Any]]:
+    """Buffers of past observations by name; the place of the newest is no tensor."""
+    for group, buffers in env.observation_manager._group_obs_term_history_buffer.items():
+        for name, buffer in buffers.items():
+            yield f"{group}.{name}", buffer
 
 
 def _defaults(env: ManagerBasedRlEnv) -> dict[str, torch.Tensor]:

@@ -141,7 +141,7 @@ def _inputs(policy: Policy, of_joints: Match) -> tuple[NDArray[np.intp], NDArray
     order, sign, start = np.arange(policy.network.size), np.ones(policy.network.size, np.float32), 0
     for name, length in policy.terms:
         if name in OF_JOINTS:
-            entries, turned = of_joints.inverse.entries(name, policy.rolls.tolist())
+            entries, turned = of_joints.inverse.entries(name, policy.rolls.tolist(), length)
             order[start : start + length] = start + np.array(entries)
             sign[start : start + length] = turned
         start += length
@@ -182,5 +182,5 @@ def _load(
         alg.load(fit(content), dict.fromkeys(("actor", *more), True), strict=True)
     except (KeyError, RuntimeError) as error:
         cause = f"the policy of {file} does not fit: {first_sentence(error)}"
-        remedy = "use one with the same layers, `see_design` and height scan"
+        remedy = "use one with the same observations and layers"
         raise DraftError(cause, remedy) from None

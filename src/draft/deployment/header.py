@@ -1,0 +1,109 @@
+"""The header of a controller in C++: its numbers, and the code that is the same for all."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from draft.deployment.numbers import Number
+from draft.deployment.observations import TERMS
+from draft.learn.policy.policy import Policy
+
+_PER_LINE = 12
+
+
+def header(numbers: Mapping[str, Number], policy: Policy) -> str:
+    """Text of `controller.hpp`.
+
+    Args:
+        numbers: numbers of the controller.
+        policy: the policy, for the terms of its observation.
+    """
+    terms = [name for name, _ in policy.terms]
+    estimates = [TERMS[name].estimated for name in terms if TERMS[name].estimated]
+    words = {
+        "NUMBERS": "\n".join(_constants(numbers)),
+        "LAYERS": "\n".join(_layers(numbers)),
+        "ESTIMATES": "".join(
+            f"  Vector {one}{{}};  // No sensor gives it: yours to estimate; see README.md.\n"
+            for one in estimates
+        ),
+        "ESTIMATED_FINITE": "".join(f" ||\n        !detail::finite(s.{x})" for x in estimates),
+        "OBSERVE": "\n".join(_observed(policy)),
+    }
+    text = Path(__file__).with_name("controller.hpp.in").read_text(encoding="utf-8")
+    return re.sub("@([A-Z_]+)@", lambda found: words[found[1]], text)
+
+
+def _observed(policy: Policy) -> Iterator[str]:
+    """Statements that write the terms of an observation."""
+    for (name, length), count in zip(policy.terms, policy.history, strict=True):
+        sizes, past = f"({length // count}, {count});", count > 1
+        if past:
+            yield f"    past{sizes}"
+        yield f"    {TERMS[name].code}  // {name}"
+        if past:
+            yield f"    fill{sizes}"
+
+
+def _constants(numbers: Mapping[str, Number]) -> list[str]:
+    joints, entries = numbers["joint_names"].value, numbers["mean"].value
+    lines = [
+        f"constexpr std::size_t JOINTS = {np.size(joints)};",
+        f"constexpr std::size_t OBSERVATIONS = {np.size(entries)};",
+    ]
+    for name, (value, unit, doc) in numbers.items():
+        lines.append(f"// {doc[:1].upper()}{doc[1:]}{f' [{unit}]' if unit else ''}.")
+        array = np.asarray(value)
+        if not array.ndim:
+            lines.append(f"constexpr double {name.upper()} = {_text(array.item())};")
+            continue
+        # Weights by inputs: see `detail::layer`.
+        flat, kind = array.T.ravel(), _kind(array)
+        if kind == "float":
+            lines.append(f"inline constexpr float {name.upper()}[] = {{")
+        else:
+            lines.append(f"constexpr std::array<{kind}, {flat.size}> {name.upper()} = {{")
+        texts = [_text(one, kind == "float") for one in flat.tolist()]
+        lines += [
+            f"    {', '.join(texts[i : i + _PER_LINE])}," for i in range(0, len(texts), _PER_LINE)
+        ]
+        lines.append("};")
+    return lines
+
+
+def _kind(array: np.ndarray) -> str:
+    """Type of C++ of the entries of an array."""
+    if array.dtype.kind == "f":
+        return "float" if array.dtype.itemsize == 4 else "double"
+    return {"b": "bool", "U": "const char*"}[array.dtype.kind]
+
+
+def _text(value: object, single: bool = False) -> str:
+    """A literal; nine digits restore every number of single precision."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.9g}" if single else repr(value)
+
+
+def _layers(numbers: Mapping[str, Number]) -> list[str]:
+    """Statements that evaluate the layers."""
+    biases = [number for name, number in numbers.items() if name.startswith("bias_")]
+    lines, before = [], "OBSERVATIONS"
+    for i, bias in enumerate(biases):
+        size = np.size(bias.value)
+        last = i + 1 == len(biases)
+        out = "action.data()" if last else f"x{i + 1}"
+        if not last:
+            lines.append(f"  double {out}[{size}];")
+        sizes = f"{before}, {'JOINTS' if last else size}"
+        lines.append(f"  detail::layer<{sizes}>(x{i}, WEIGHT_{i}, BIAS_{i}, {out});")
+        if not last:
+            lines.append(f"  detail::elu<{size}>({out});")
+        before = str(size)
+    return lines
