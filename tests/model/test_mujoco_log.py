@@ -12,12 +12,11 @@ import pytest
 import draft
 
 SOURCE = Path(draft.__file__).parent
-# Modules that compute physics, outside the package `model` and without the libraries for learning.
+# Modules that compute physics, without the libraries for learning.
 MODULES = [
     ".".join(path.relative_to(SOURCE.parent).with_suffix("").parts)
     for path in sorted(SOURCE.rglob("*.py"))
     if re.search(r"(?m)^ .*\bmj_(?:step|forward)\w*\(", path.read_text(encoding="utf-8"))
-    and path.relative_to(SOURCE).parts[0] != "model"
     and "start_mjlab" not in (path.parent / "__init__.py").read_text(encoding="utf-8")
 ]
 UNSTABLE = """
@@ -42,7 +41,7 @@ def _run(code: str, *words: str, folder: Path) -> str:
     return done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("module", ["draft.model", *MODULES])
+@pytest.mark.parametrize("module", ["draft.model.model", *MODULES])
 def test_an_unstable_simulation_writes_no_file(module: str, tmp_path: Path) -> None:
     assert "The simulation is unstable" in _run(UNSTABLE, module, folder=tmp_path)
     assert not [*tmp_path.iterdir()]
@@ -55,5 +54,5 @@ config = mujoco.MjLogConfig.get()
 config.logfile = "mine.txt"
 config.set()
 """
-    _run(named + UNSTABLE, "draft.model", folder=tmp_path)
+    _run(named + UNSTABLE, "draft.model.model", folder=tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.design.design import Design
 from draft.model.pose import UPRIGHT, base_coordinates
 from draft.model.xml import Element

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.design.actuators import Actuator
 from draft.design.design import Design
 from draft.design.findings import Finding, note

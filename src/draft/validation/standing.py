@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.design import Design
 from draft.design.legs import GRAVITY, legs
 from draft.learn.bodies.legged import LeggedRobot
