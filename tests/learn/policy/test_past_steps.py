@@ -74,7 +74,7 @@ def test_a_controller_in_plain_mujoco_remembers_what_the_environment_does(
         for i in range(STEPS + 2):
             # The same state in both, so that only what they remember can differ.
             data.qpos[:], data.qvel[:] = state.qpos[0].numpy(), state.qvel[0].numpy()
-            seen = env.observation_manager.compute()["actor"]
+            seen: Any = env.observation_manager.compute()["actor"]
             found = controller.observe(data, COMMAND)
             np.testing.assert_allclose(found, seen[0].numpy(), atol=1e-4, err_msg=f"step {i}")
             np.testing.assert_array_equal(controller.observe(data, COMMAND), found)

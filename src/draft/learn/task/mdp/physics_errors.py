@@ -76,7 +76,8 @@ class DryFriction:
         self._env, self._robot = env, robot_of(env)
         seed = env.cfg.seed
         rng = np.random.default_rng(None if seed is None else (DRY_STREAM, seed))
-        drawn = rng.uniform(*cfg.params["within"], self._robot.peak_torque.shape)
+        low, high = cfg.params["within"]
+        drawn = rng.uniform(low, high, self._robot.peak_torque.shape)
         self._share = torch.tensor(drawn, dtype=torch.float32, device=env.device)
 
     def __call__(self, env: ManagerBasedRlEnv, env_ids: torch.Tensor | None, within: Range) -> None:
