@@ -130,11 +130,10 @@ def urdf(model: Model) -> dict[str, str | bytes]:
     }
 
 
-@exporter("robot.sdf", "model.config", "meshes/trunk.stl")
+@exporter("robot.sdf", "model.config", "meshes/trunk.obj")
 def sdf(model: Model) -> dict[str, str | bytes]:
     """SDFormat with the mesh of the trunk, as a folder that Gazebo finds as a model."""
-    from draft.model.sdf import model_config, robot_sdf
-    from draft.model.urdf import meshes
+    from draft.model.sdf import meshes, model_config, robot_sdf
 
     return {
         "robot.sdf": robot_sdf(model),
