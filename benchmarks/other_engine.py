@@ -2,9 +2,9 @@
 
     python -m benchmarks.other_engine cheetah bear giraffe
 
-The engines are those of `benchmarks.engines`. The robot of Drake is the SDFormat that `draft export`
-writes. Numbers are written after each robot and engine, and what is there already is not measured
-again. `python -m docs.real_robots` makes a table of them.
+The engines are those of `benchmarks.engines`; the robot of Drake is the SDFormat of `draft export`.
+Numbers are written after each robot and engine, and what is there already is not measured again.
+`python -m docs.real_robots` makes a table of them.
 """
 
 from __future__ import annotations

@@ -164,3 +164,22 @@ def step(model: Model) -> dict[str, str | bytes]:
     from draft.model.step import robot_step
 
     return {"robot.step": robot_step(model), "bom.csv": bom_csv(model.design)}
+
+
+@exporter("mjlab_robot.py", "robot.xml")
+def mjlab(model: Model) -> dict[str, str | bytes]:
+    """Python file that configures the robot for mjlab, and its MJCF."""
+    from draft.model.lab import mjlab_py
+
+    return {"mjlab_robot.py": mjlab_py(model), "robot.xml": model.xml}
+
+
+@exporter("isaaclab_robot.py", "robot.urdf", "meshes/trunk.stl")
+def isaaclab(model: Model) -> dict[str, str | bytes]:
+    """Python file that configures the robot for Isaac Lab, and its URDF."""
+    from draft.model.lab import isaaclab_py
+
+    files = urdf(model)
+    return {"isaaclab_robot.py": isaaclab_py(model)} | {
+        name: content for name, content in files.items() if name != "actuators.json"
+    }
