@@ -105,12 +105,14 @@ class Drake:
             CoulombFriction,
             MultibodyPlantConfig,
         )
-        from pydrake.systems.analysis import Simulator
         from pydrake.systems.framework import DiagramBuilder
 
         builder = DiagramBuilder()
         settings = MultibodyPlantConfig(
-            time_step=step, contact_model="point", discrete_contact_approximation=solver
+            time_step=step,
+            contact_model="point",
+            discrete_contact_approximation=solver,
+            use_sampled_output_ports=False,  # For forces of the state as it is.
         )
         plant, scene = AddMultibodyPlant(settings, builder)
         (robot,) = Parser(plant).AddModels(file)
@@ -127,9 +129,8 @@ class Drake:
         alone = CollisionFilterDeclaration().ExcludeWithin(GeometrySet(own))
         scene.collision_filter_manager().Apply(alone)
         self.plant: Any = plant
-        self._simulator: Any = Simulator(builder.Build())
-        self._simulator.Initialize()
-        self._root = self._simulator.get_mutable_context()
+        self._diagram: Any = builder.Build()
+        self._root = self._diagram.CreateDefaultContext()
         self.context: Any = plant.GetMyMutableContextFromRoot(self._root)
         self._step = step
         self._friction = {
@@ -148,18 +149,19 @@ class Drake:
             torques[v] = data.qfrc_applied[_BASE[1] :] - friction * np.tanh(speeds / _STICK)
             port = self.plant.get_applied_generalized_force_input_port()
             port.FixValue(self.context, torques)
-            self._simulator.AdvanceTo(self._root.get_time() + self._step)
+            after = self._diagram.EvalUniquePeriodicDiscreteUpdate(self._root)
+            self._root.SetDiscreteState(after)
         self._take(data, q, v)
         _moved(model, data)
 
-    def weight_on_floor(self) -> float:
-        """Sum of the vertical contact forces of the last step [N]."""
+    def floor_forces(self) -> np.ndarray:
+        """Forces between the robot and the floor in the world [N], shape (contacts, 3).
+
+        Their signs are those of Drake's order of the two bodies.
+        """
         found = self.plant.get_contact_results_output_port().Eval(self.context)
-        forces = [
-            found.point_pair_contact_info(i).contact_force()
-            for i in range(found.num_point_pair_contacts())
-        ]
-        return float(np.abs(np.array(forces).reshape(-1, 3)[:, 2]).sum())
+        infos = map(found.point_pair_contact_info, range(found.num_point_pair_contacts()))
+        return np.array([info.contact_force() for info in infos]).reshape(-1, 3)
 
     def _places(self, model: mujoco.MjModel) -> tuple[list[int], list[int], np.ndarray]:
         """Of each joint of a model: places in Drake's positions and velocities, and friction."""
