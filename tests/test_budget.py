@@ -27,7 +27,7 @@ BUDGET = {
     "laws": 2_090,  # The nearest module of the catalogue.
     "learn": 20_220,
     "metrics": 3_200,
-    "model": 5_160,  # STEP, a bill of materials, SDFormat, and the package for ROS 2.
+    "model": 5_350,  # Configurations for mjlab and Isaac Lab, and OBJ for SDFormat.
     "reporting": 1_820,
     "serving": 560,
     "spec": 5_170,

@@ -187,8 +187,8 @@ def by_drake(folder: Path, home: dict[str, float], floating: bool) -> Robot:
     from pydrake.multibody.tree import RevoluteJoint
     from pydrake.systems.framework import DiagramBuilder
 
-    parts: Any = AddMultibodyPlantSceneGraph(DiagramBuilder(), 0.001)
-    plant = parts.plant
+    builder = DiagramBuilder()
+    plant: Any = AddMultibodyPlantSceneGraph(builder, 0.001)[0]
 
     def joint_of(name: str) -> Any:
         """Joint; one that has the name of a link has another name in SDFormat."""

@@ -26,8 +26,7 @@ class Controller:
     model's own servos are switched off, and its time step is set to that of the training.
 
     Attributes:
-        advance: function that advances the state of the model by a time step, with the torques in
-            `qfrc_applied`: that of MuJoCo, unless another engine takes its place.
+        advance: physics step with the torques in `qfrc_applied`; that of MuJoCo by default.
     """
 
     def __init__(self, policy: Policy, model: mujoco.MjModel) -> None:
