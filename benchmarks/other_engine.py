@@ -116,12 +116,14 @@ def measured(design: Design, engine: str, starts: int, kicks: int) -> list[dict[
             found = [play(skill, course, seed, SECONDS) for seed in range(starts)]
             speed = round(statistics.fmean(one for one, _ in found), 3)
             falls = sum(one for _, one in found)
-            rows.append({"skill": skill, "command": command, "speed": speed, "falls": falls})
+            row = {"skill": skill, "command": command, "roll_outs": starts}
+            rows.append(row | {"speed": speed, "falls": falls})
         for size in KICKS:
             course = Course(kick=size)
             falls = [play("push", course, seed, KICKED)[1] for seed in range(kicks)]
             stood = sum(one == 0 for one in falls) / kicks
-            rows.append({"skill": "push", "kick": size, "stood": round(stood, 3)})
+            row = {"skill": "push", "kick": size, "roll_outs": kicks}
+            rows.append(row | {"stood": round(stood, 3)})
         return rows
 
 
