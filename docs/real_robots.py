@@ -86,8 +86,9 @@ of a machine's own: `draft twin FILE --capabilities --train DIR`."""
 ENGINES_TEXT = """\
 Shipped policies in other engines (`python -m benchmarks.other_engine`; {versions}):
 the policy, what it observes and its torques are the same, the physics is another. Speeds are means
-[m/s]; after a kick of at most that much along x and y, the share that does not fall within 2.5 s.
-Drake reads the SDFormat of `draft export`: masses, joints, armatures, damping, friction and shapes.
+[m/s] of {starts} starts; after a kick of at most that much along x and y, the share of {kicks}
+that does not fall within 2.5 s. Drake reads the SDFormat of `draft export`: masses,
+joints, armatures, damping, friction and shapes.
 
 - MuJoCo: steps of 5 ms and contacts of 20 ms, as in the training of these policies. The next column
   has steps of 1 ms, and `hard` contacts of 4 ms too. MuJoCo Warp has the physics of the first, in
@@ -428,7 +429,7 @@ def _engines() -> list[str]:
     known = json.loads(ENGINES.read_text(encoding="utf-8"))
     found: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
     for row in known["rows"]:
-        size = f"at {row['command']:g}" if "command" in row else f"kick of {row['kick']:g}"
+        size = f"at {row['command']:.3g}" if "command" in row else f"kick of {row['kick']:.3g}"
         label = f"{row['skill']} {size} m/s" if "command" in row else f"{size} m/s"
         found.setdefault((row["robot"], label), {})[row["engine"]] = row
     names = list(dict.fromkeys(row["engine"] for row in known["rows"]))
@@ -445,10 +446,16 @@ def _engines() -> list[str]:
         versions=", ".join(
             f"{name} {number}" for name, number in sorted(known["versions"].items())
         ),
+        starts=_ends([row["roll_outs"] for row in known["rows"] if "speed" in row]),
+        kicks=_ends([row["roll_outs"] for row in known["rows"] if "stood" in row]),
         most=f"{100 * gaps['MuJoCo']:.1f} %",
         least=f"{100 * gaps['MuJoCo, hard']:.1f} %",
     )
     return ["## Another engine", "", *text.splitlines(), "", *lines, ""]
+
+
+def _ends(values: Sequence[int]) -> str:
+    return f"{min(values)} to {max(values)}"
 
 
 def _engine_cell(row: dict[str, Any] | None) -> str:
