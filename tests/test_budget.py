@@ -29,7 +29,7 @@ BUDGET = {
     "laws": 2_090,  # The nearest module of the catalogue.
     "learn": 20_410,  # Policies without a velocity: history, encoders, dry friction.
     "metrics": 3_200,
-    "model": 5_180,  # STEP, a bill of materials, SDFormat, and the package for ROS 2.
+    "model": 5_380,  # Configurations for mjlab and Isaac Lab, and OBJ for SDFormat.
     "reporting": 1_590,
     "serving": 700,  # Files and messages for a page on this machine.
     "spec": 5_170,

@@ -60,7 +60,7 @@ def offered(completion: Path, *words: str) -> list[str]:
         (("build", "quadruped", "--design", "ch"), ["cheetah"]),
         (("build", "ro"), ["robot"]),
         (("export", "bear", "--format", "u"), ["urdf"]),
-        (("export", "bear", "--format", "urdf", "m"), ["mjcf"]),
+        (("export", "bear", "--format", "urdf", "m"), ["mjcf", "mjlab"]),
         (("export", "bear", "--out", "some", "m"), []),
         (("train", "cheetah", "--stage", ""), ["base", "velocity", "terrain", "push", "any"]),
         (("import", "x.urdf", "--population", ""), ["humanoid", "quadruped"]),

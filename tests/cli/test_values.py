@@ -25,7 +25,10 @@ SCREEN = "screen bear --vary thigh_length=0.2:0.3 --out s --n"
             for word in ("play cheetah", "deploy cheetah --out x")
         ),
         ("import x.urdf --population None", "Expected one of ('humanoid', 'quadruped')."),
-        ("export bear --format dxf", "Expected one of ('urdf', 'sdf', 'glb', 'mjcf', 'step')."),
+        (
+            "export bear --format dxf",
+            "Expected one of ('urdf', 'sdf', 'glb', 'mjcf', 'step', 'mjlab', 'isaaclab').",
+        ),
         (
             "learn show --recipe lapto",
             "Expected one of ('paper', 'laptop', 'tune', 'any', 'machine').",

@@ -18,7 +18,7 @@ import pytest
 import draft
 from draft.imports.importer import import_robot
 from draft.laws.catalogue import catalogue
-from draft.model import urdf
+from draft.model import sdf, urdf
 from draft.model.shapes import matrix
 from draft.model.urdf import rpy
 from tests.helpers import robot
@@ -200,10 +200,12 @@ def test_roll_pitch_and_yaw_give_the_rotation_again(pitch: float) -> None:
 
 
 def test_the_trunks_mesh_is_closed_and_weighs_what_it_should(model: draft.Model) -> None:
-    read = trimesh.load(io.BytesIO(urdf.trunk_stl(model.design.trunk.loft)), file_type="stl")
-    assert read.is_watertight
     trunk = model.design.trunk
-    assert read.volume * float(trunk.density) == pytest.approx(float(trunk.mass), rel=1e-5)
+    stl, obj = urdf.trunk_stl(trunk.loft), sdf.meshes(model.design)[sdf.TRUNK].encode()
+    for content, kind in ((stl, "stl"), (obj, "obj")):
+        read = trimesh.load(io.BytesIO(content), file_type=kind)
+        assert read.is_watertight
+        assert read.volume * float(trunk.density) == pytest.approx(float(trunk.mass), rel=1e-5)
 
 
 def standing(model: draft.Model) -> mujoco.MjData:

@@ -180,13 +180,15 @@ def follows_in_sdf(folder: Path) -> dict[str, tuple[str, float, float]]:
 
 
 def by_drake(folder: Path, home: dict[str, float], floating: bool) -> Robot:
-    """SDFormat as Drake reads it, by the parser of Gazebo."""
+    """SDFormat as Drake reads it, by the parser of Gazebo, with shapes that can touch."""
     pytest.importorskip("pydrake.multibody.parsing", reason="drake has no wheel for this system")
     from pydrake.multibody.parsing import Parser
-    from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
+    from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContactApproximation
     from pydrake.multibody.tree import RevoluteJoint
+    from pydrake.systems.framework import DiagramBuilder
 
-    plant: Any = MultibodyPlant(0.001)
+    builder = DiagramBuilder()
+    plant: Any = AddMultibodyPlantSceneGraph(builder, 0.001)[0]
 
     def joint_of(name: str) -> Any:
         """Joint; one that has the name of a link has another name in SDFormat."""

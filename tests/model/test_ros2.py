@@ -365,11 +365,12 @@ def test_the_command_writes_a_package_and_nothing_else(
     assert not (tmp_path / "other").exists()
 
 
-def test_sdf_and_urdf_of_one_folder_share_the_mesh(tmp_path: Path) -> None:
+def test_sdf_and_urdf_of_one_folder_have_a_mesh_each(tmp_path: Path) -> None:
     folder = built("hopper", None).save(tmp_path / "out", ("urdf", "sdf"))
     found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert found == {
         *("robot.urdf", "robot.sdf", "model.config", "actuators.json", "meshes/trunk.stl"),
+        "meshes/trunk.obj",
         *("design.yaml", "report.json"),
     }
     assert np.frombuffer((folder / "meshes/trunk.stl").read_bytes(), np.uint8).size > 84

@@ -130,11 +130,10 @@ def urdf(model: Model) -> dict[str, str | bytes]:
     }
 
 
-@exporter("robot.sdf", "model.config", "meshes/trunk.stl")
+@exporter("robot.sdf", "model.config", "meshes/trunk.obj")
 def sdf(model: Model) -> dict[str, str | bytes]:
     """SDFormat with the mesh of the trunk, as a folder that Gazebo finds as a model."""
-    from draft.model.sdf import model_config, robot_sdf
-    from draft.model.urdf import meshes
+    from draft.model.sdf import meshes, model_config, robot_sdf
 
     return {
         "robot.sdf": robot_sdf(model),
@@ -165,3 +164,22 @@ def step(model: Model) -> dict[str, str | bytes]:
     from draft.model.step import robot_step
 
     return {"robot.step": robot_step(model), "bom.csv": bom_csv(model.design)}
+
+
+@exporter("mjlab_robot.py", "robot.xml")
+def mjlab(model: Model) -> dict[str, str | bytes]:
+    """Python file that configures the robot for mjlab, and its MJCF."""
+    from draft.model.lab import mjlab_py
+
+    return {"mjlab_robot.py": mjlab_py(model), "robot.xml": model.xml}
+
+
+@exporter("isaaclab_robot.py", "robot.urdf", "meshes/trunk.stl")
+def isaaclab(model: Model) -> dict[str, str | bytes]:
+    """Python file that configures the robot for Isaac Lab, and its URDF."""
+    from draft.model.lab import isaaclab_py
+
+    files = urdf(model)
+    return {"isaaclab_robot.py": isaaclab_py(model)} | {
+        name: content for name, content in files.items() if name != "actuators.json"
+    }

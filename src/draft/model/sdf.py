@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING
 
 import mujoco
 
-from draft.design.design import Body
+from draft.design.design import Body, Design
 from draft.model.mjcf import colors
 from draft.model.shapes import Shape, matrix, shapes
 from draft.model.urdf import (
     DECLARATION,
     LEAST_MASS,
-    TRUNK,
     distinct_name,
     joint_name,
     rpy,
@@ -33,10 +32,11 @@ if TYPE_CHECKING:
     from draft.model.model import Model
 
 VERSION = "1.11"  # The first with `mimic`.
+TRUNK = "meshes/trunk.obj"  # Drake finds contacts with OBJ, and refuses STL.
 
 
 def robot_sdf(model: Model) -> str:
-    """SDFormat text of the robot; it refers to the mesh `meshes/trunk.stl` in the same folder."""
+    """SDFormat text of the robot; it refers to the mesh `TRUNK` in the same folder."""
     design, compiled = model.design, model.mujoco
     root = Element("sdf", version=VERSION, **{"xmlns:drake": "http://drake.mit.edu"})
     robot = root.add("model", name=design.name, canonical_link=design.bodies[0].name)
@@ -61,6 +61,17 @@ def model_config(model: Model) -> str:
     root.put("sdf", "robot.sdf", version=VERSION)
     root.put("description", f"{model.design.reference}, written by Draft")
     return DECLARATION + root.text()
+
+
+def meshes(design: Design) -> dict[str, str]:
+    """Text of the mesh of the trunk (Wavefront OBJ, [m]) by its path; a fixed base has none."""
+    if design.lofted is None:
+        return {}
+    loft = design.lofted.loft
+    points = (" ".join(f"{x:.10g}" for x in point) for point in loft.vertices.tolist())
+    faces = (" ".join(map(str, face)) for face in (loft.faces() + 1).tolist())
+    lines = [*(f"v {point}" for point in points), *(f"f {face}" for face in faces)]
+    return {TRUNK: "\n".join(lines) + "\n"}
 
 
 def _link(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -24,6 +24,9 @@ class Controller:
     The model is that of `robot.xml` or `scene.xml`, or has the same joints and sensors. Torques are
     applied directly to the joints, within the torque-speed line, at every physics step; the
     model's own servos are switched off, and its time step is set to that of the training.
+
+    Attributes:
+        advance: physics step with the torques in `qfrc_applied`; that of MuJoCo by default.
     """
 
     def __init__(self, policy: Policy, model: mujoco.MjModel) -> None:
@@ -38,6 +41,7 @@ class Controller:
                 observation that a controller cannot compute.
         """
         self.policy, self.model = policy, model
+        self.advance: Callable[[mujoco.MjModel, mujoco.MjData], None] = mujoco.mj_step
         unknown = [name for name, _ in policy.terms if name not in _TERMS]
         if unknown:
             cause = f"the policy observes {', '.join(unknown)}, which a controller cannot compute"
@@ -121,7 +125,7 @@ class Controller:
         data.qfrc_applied[self._v] = self.policy.torque(
             self._action, data.qpos[self._q], data.qvel[self._v]
         )
-        mujoco.mj_step(self.model, data)
+        self.advance(self.model, data)
 
     def observe(self, data: mujoco.MjData, command: ArrayLike) -> NDArray[np.float32]:
         """Return the observation of the policy, without noise.
