@@ -124,9 +124,13 @@ class Compiler:
         quat = _unit(table[geoms.quat][..., : 1 if self.aligned else None])
         volume, moments = _measures(geoms, size)
         frames = quat
-        if self.loft is not None:
+        # Parts of one's own weigh nothing: boxes have their inertia.
+        lofts = self.meshes[~geoms.massless[self.meshes]]
+        parts = self.meshes[geoms.massless[self.meshes]]
+        volume[parts], moments[parts] = 1.0, 0.0
+        if self.loft is not None and len(lofts):
             frames = np.repeat(quat, size.shape[-1] // quat.shape[-1], axis=-1)
-            for k in self.meshes:
+            for k in lofts:
                 volume[k], pos[k], frames[k], moments[k] = _mesh(self.loft, rows)
         sound = (volume[self.solids] > 0).all(axis=0)
         sound &= (volume[self.meshes] > _LEAST_VOLUME).all(axis=0)

@@ -19,9 +19,9 @@ from draft.model.shapes import Shape, matrix, shapes
 from draft.model.urdf import (
     DECLARATION,
     LEAST_MASS,
-    TRUNK,
     distinct_name,
     joint_name,
+    mesh_file,
     rpy,
     tensor,
 )
@@ -36,7 +36,7 @@ VERSION = "1.11"  # The first with `mimic`.
 
 
 def robot_sdf(model: Model) -> str:
-    """SDFormat text of the robot; it refers to the mesh `meshes/trunk.stl` in the same folder."""
+    """SDFormat text of the robot; it refers to the meshes of `meshes` in the same folder."""
     design, compiled = model.design, model.mujoco
     root = Element("sdf", version=VERSION, **{"xmlns:drake": "http://drake.mit.edu"})
     robot = root.add("model", name=design.name, canonical_link=design.bodies[0].name)
@@ -82,10 +82,11 @@ def _link(
     for name, value in tensor(compiled, i).items():
         inertia.put(name, value)
     for shape in drawn:
-        visual = _shape(link, "visual", shape, shape.name)
-        material = visual.add("material")
-        material.put("ambient", paint[shape.kind])
-        material.put("diffuse", paint[shape.kind])
+        if shape.drawn:
+            visual = _shape(link, "visual", shape, shape.name)
+            material = visual.add("material")
+            material.put("ambient", paint[shape.kind])
+            material.put("diffuse", paint[shape.kind])
         if shape.collides:
             _shape(link, "collision", shape, f"{shape.name}_collision")
 
@@ -94,8 +95,8 @@ def _shape(link: Element, use: str, shape: Shape, name: str) -> Element:
     element = link.add(use, name=name)
     element.put("pose", (*shape.position, *rpy(shape.rotation)))
     geometry = element.add("geometry").add(shape.form)
-    if shape.form == "mesh":
-        geometry.put("uri", TRUNK)
+    if shape.mesh is not None:
+        geometry.put("uri", mesh_file(shape.mesh))
     elif shape.form == "box":
         geometry.put("size", 2 * shape.size)
     else:

@@ -146,8 +146,8 @@ def _parts(subject: Subject) -> dict[str, Part]:
     if model is None:
         return {}
     found: dict[str, list[Part]] = {}
-    for shape in shapes(model.mujoco, model.design):
-        solid = triangles(shape, model.design, SEGMENTS)
+    for shape in filter(lambda one: one.drawn, shapes(model.mujoco, model.design)):
+        solid = triangles(shape, SEGMENTS)
         points = solid.points @ shape.rotation.T + shape.position
         bodies = np.full(len(points), shape.body - 1)
         part = Part(points, solid.normals @ shape.rotation.T, bodies)

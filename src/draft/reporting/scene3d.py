@@ -82,13 +82,11 @@ def robot_triangles(model: Model) -> dict[str, Triangles]:
     c, s = math.cos(YAW), math.sin(YAW)
     yaw = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     found: dict[str, list[Triangles]] = {}
-    for i, shape in enumerate(shapes(model.mujoco, model.design)):
-        solid = triangles(shape, model.design, SEGMENTS)
-        if shape.form == "mesh":
-            frame, position = data.xmat[shape.body], data.xpos[shape.body]
-        else:
-            frame, position = data.geom_xmat[i], data.geom_xpos[i]
-        rotation = yaw @ frame.reshape(3, 3)
+    for shape in filter(lambda one: one.drawn, shapes(model.mujoco, model.design)):
+        solid = triangles(shape, SEGMENTS)
+        frame = data.xmat[shape.body].reshape(3, 3)
+        position = data.xpos[shape.body] + frame @ shape.position
+        rotation = yaw @ frame @ shape.rotation
         parts = found.setdefault(shape.kind, [])
         before = sum(len(part.points) for part in parts)
         points = solid.points @ rotation.T + yaw @ position
