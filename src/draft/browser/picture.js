@@ -5,6 +5,7 @@ const SKY = 0xe4eaf0, LIGHT = "#d4d9dd", DARK = "#c6ccd2", SHADE = 0xa9b2ba;
 const SUN = new THREE.Vector3(0.35, -0.45, 1);
 const SLOW = 0.045, TRIED = 12; // Time of a picture that is too long [s]; pictures before a change.
 const LEAST = 0.5; // Least resolution, per pixel of the screen.
+const TRUNK = 1; // Its body: the world comes first.
 const SPHERE = 2, CYLINDER = 5, BOX = 6, MESH = 7; // of mjtGeom
 const UNIT = {
   [SPHERE]: new THREE.SphereGeometry(1, 20, 14),
@@ -29,10 +30,11 @@ class Figure {
     this.parts = [];
     const { model } = robot, shade = new THREE.MeshBasicMaterial({ color: SHADE });
     for (let geom = 0; geom < model.ngeom; geom++) {
+      if (model.geom_rgba[4 * geom + 3] === 0) continue; // It only collides, or has an inertia.
       const type = model.geom_type[geom];
       if (type !== MESH && !UNIT[type]) continue;
       const rgb = new THREE.Color();
-      if (type === MESH && color) rgb.set(color);
+      if (type === MESH && model.geom_bodyid[geom] === TRUNK && color) rgb.set(color);
       else rgb.setRGB(model.geom_rgba[4 * geom], model.geom_rgba[4 * geom + 1], model.geom_rgba[4 * geom + 2], THREE.SRGBColorSpace);
       const shape = type === MESH ? new THREE.BufferGeometry() : UNIT[type];
       const mesh = new THREE.Mesh(shape, new THREE.MeshLambertMaterial({ color: rgb, flatShading: type === MESH }));

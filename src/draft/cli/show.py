@@ -14,12 +14,13 @@ from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, V
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
-from draft.design.report import actuator_rows, mass_parts
+from draft.design.report import actuator_rows, mass_by_origin, mass_parts, own_parts
 from draft.design.structure_law import structure_laws, trunk_words
 from draft.design.widened import mass_with_band
 from draft.spec.primitives.root import TrunkPart
 
 BAR = 28
+_ORIGINS = {"trend": "predicted"}
 
 
 def main(
@@ -159,4 +160,11 @@ def _masses(design: Design) -> Table:
     low, high = (f"{x:.1f}" for x in (mass.low, mass.high))
     why = f"wider: {', '.join(mass.wider)}" if mass.wider else ""
     table.add_row("90 % band", Text(f"{low} .. {high}"), "", Text(why, style="dim"))
+    if parts := own_parts(design):
+        for origin, kg in mass_by_origin(design).items():
+            files = ", ".join(
+                dict.fromkeys(one["file"] for one in parts if one["origin"] == origin)
+            )
+            share, note = kg / total, Text(files, style="dim")
+            table.add_row(_ORIGINS.get(origin, origin), f"{kg:.2f}", f"{100 * share:.0f}", note)
     return table

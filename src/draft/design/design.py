@@ -122,10 +122,15 @@ class Body(NamedTuple):
 
     def link_solids(self) -> Iterator[Geom]:
         """Solids of the link itself: member and end."""
+        return (geom for geom, _ in self.replaced())
+
+    def replaced(self) -> Iterator[tuple[Geom, ShapePart | None]]:
+        """Solids of the link itself, each with the part in its place, if any."""
         if (member := self.link.member) is not None:
-            yield member.geom(self.link.tip, self.member_radius, self.member_mass)
+            rod = member.geom(self.link.tip, self.member_radius, self.member_mass)
+            yield rod, self.link.shape
         if (end := self.end_geom) is not None:
-            yield end
+            yield end, None
 
     def geoms(self) -> Iterator[Geom]:
         """Solids of a model: member, actuator, pulley and end, or parts in place of the former.
