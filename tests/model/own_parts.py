@@ -14,7 +14,7 @@ import draft
 from tests.helpers import DRIVE, leg, robot
 
 Array = np.ndarray
-LENGTH, RADIUS = 0.3, 0.03
+LENGTH, RADIUS = 0.3, 0.03  # of a rod [m]
 BOTH = [
     {"chain": "leg", "at": [0.1, 0.15, -0.2], "prefix": "L_"},
     {"chain": "leg", "at": [0.1, 0.15, -0.2], "prefix": "R_", "mirror": "y"},
@@ -27,7 +27,7 @@ def hook(scale: float = 1.0) -> trimesh.Trimesh:
     faces = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)]
     flat = np.array(corners)
     low = np.column_stack([flat[:, 0], np.full(6, 0.01), -flat[:, 1]])
-    high = low + (0.004, 0.03, 0.0)  # Sheared, so that no plane is one of symmetry.
+    high = low + np.array([0.004, 0.03, 0.0])  # Sheared, so that no plane is one of symmetry.
     points = np.vstack([low, high])
     sides = [(i, (i + 1) % 6) for i in range(6)]
     triangles = [tuple(reversed(f)) for f in faces] + [tuple(6 + i for i in f) for f in faces]
@@ -36,7 +36,8 @@ def hook(scale: float = 1.0) -> trimesh.Trimesh:
     made = trimesh.Trimesh(points * scale, triangles, process=False)
     if made.volume < 0:
         made.invert()
-    assert made.is_watertight and made.volume > 0
+    assert made.is_watertight
+    assert made.volume > 0
     return made
 
 

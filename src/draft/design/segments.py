@@ -101,7 +101,8 @@ def weigh(
     copies = len(segment.copies)
     centre = _member_centre(segment, own, members[0], ends[0], skeleton)
     of_parts = g.total(part for part in parts if part is not None)
-    by_law = None in parts or any(k.end and k.end.of_segment and k.end.mass is None for k in own)
+    by_law = any(part is None for part in parts)
+    by_law = by_law or any(k.end and k.end.of_segment and k.end.mass is None for k in own)
     trend = segment.trend if by_law else None
     weighed = SegmentMass(segment.label, trend, kind, length, mass, centre, names, copies, of_parts)
     return Weighed(weighed, members, ends)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from draft.model.batch_layout import TYPES, Geoms, Index, Layout
 from draft.model.decimals import rounded
-from draft.model.principal import apply, matrices, off_centre, principal, product, turned
+from draft.model.principal import apply, composed, matrices, off_centre, principal, product, turned
 from draft.spec.primitives.loft import Loft
 from draft.values import Array
 
@@ -139,18 +139,23 @@ class Compiler:
         bodies = self._bodies(mass, pos, quat, frames, moments)
         self._place_massless(bodies, table)
         radius, half = _around(geoms, size)
-        # The template's mesh has its own place and box.
+        # The template's mesh has its own place and box; a part moves with its geom.
+        t = self.template
         for k in self.meshes:
             own = geoms.ids[k]
-            pos[k] = self.template.geom_pos[own, :, None]
-            quat[k] = self.template.geom_quat[own, :, None]
-            half[k] = self.template.geom_aabb[own, 3:, None]
+            half[k] = t.geom_aabb[own, 3:, None]
+            if k in parts:
+                mesh = t.geom_dataid[own]
+                pos[k] += apply(matrices(quat[k]), t.mesh_pos[mesh, :, None])
+                quat[k] = composed(quat[k], t.mesh_quat[mesh, :, None])
+            else:
+                pos[k], quat[k] = t.geom_pos[own, :, None], t.geom_quat[own, :, None]
         ids, solid = geoms.ids[self.solids], self.solids
-        whole = slice(None)
+        whole, moved = slice(None), np.concatenate([solid, parts])
         patches = [
             Patch("geom_size", False, ids, whole, size[solid]),
-            Patch("geom_pos", False, ids, whole, pos[solid]),
-            Patch("geom_quat", False, ids, whole, quat[solid]),
+            Patch("geom_pos", False, geoms.ids[moved], whole, pos[moved]),
+            Patch("geom_quat", False, geoms.ids[moved], whole, quat[moved]),
             Patch("geom_rbound", False, ids, whole, radius[solid]),
             Patch("geom_aabb", False, ids, slice(3, 6), half[solid]),
             *self._body_patches(bodies),
@@ -159,7 +164,6 @@ class Compiler:
         same = self._same_frames(bodies)
         patches.append(Patch("body_sameframe", False, np.arange(1, len(same)), whole, same[1:]))
         # A body that floats alone has a diagonal M(q) if its frames agree, which MuJoCo relies on.
-        t = self.template
         simple = np.flatnonzero(t.body_simple[1:]) + 1
         sound &= (same[simple] == t.body_sameframe[simple, None]).all(axis=0)
         return patches, bodies.mass, sound & self._accepted(bodies)
