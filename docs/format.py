@@ -16,7 +16,7 @@ from draft.laws.quantities import QUANTITIES
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
 from draft.spec.field_types import Model
-from draft.spec.primitives import LINKS, basic, fixed, root, wheel
+from draft.spec.primitives import LINKS, basic, fixed, root, shape, wheel
 from draft.spec.primitives.basic import LinkBase
 
 FILE = Path(__file__).parent / "format.md"
@@ -126,7 +126,10 @@ ENDS: list[type[Model]] = [
 SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
     (
         "parameters.yaml",
-        (schema.ParametersFile, schema.Parameter, schema.ActuatorClass, schema.Battery),
+        (
+            *(schema.ParametersFile, schema.Parameter, schema.ActuatorClass, schema.Battery),
+            shape.Shape,
+        ),
     ),
     (
         "tree.yaml",
@@ -145,6 +148,7 @@ SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
             basic.Motor,
             basic.Pulley,
             *ENDS,
+            shape.LinkShape,
         ),
     ),
     ("root.yaml", (root.RootFile, root.Section)),

@@ -315,7 +315,8 @@ def test_many_designs_are_what_each_is_alone() -> None:
         one = varied().resolve({name: float(x[row]) for name, x in VARIED.items()})
         assert scalar(one.mass) == pytest.approx(float(np.asarray(many.mass)[row]), rel=1e-12)
         expected, found = draft.model.model.preview(one).mujoco, batch.model(place)
-        for name in ("body_mass", "body_ipos", "geom_pos", "geom_size", "body_invweight0"):
+        names = ("body_mass", "body_ipos", "geom_pos", "geom_quat", "geom_size", "bvh_aabb")
+        for name in (*names, "geom_rbound", "body_invweight0"):
             a, b = getattr(expected, name), getattr(found, name)
             assert np.abs(a - b).max() <= 1e-9 * max(1.0, np.abs(a).max()), name
         for body in one.bodies:

@@ -13,7 +13,7 @@ from draft.files import Readable
 from draft.meshes import MAX_BYTES, read_triangles
 from draft.spec.primitives.base import Written
 from draft.spec.primitives.mesh import Mesh, MeshError, closed
-from draft.spec.primitives.shape import UNITS, is_step
+from draft.spec.primitives.shape import UNITS, is_part, is_step
 from draft.spec.spec import ActuatorClass
 from draft.spec.tree import Body
 
@@ -83,7 +83,7 @@ def _bytes(file: Readable, path: str, where: Location) -> bytes:
         remedy = "put it there, in the robot's folder"
         if isinstance(file, Path) and isinstance(error, FileNotFoundError):
             cause = f"there is no file '{path}' in the robot's folder"
-            beside = sorted(one.name for one in file.parent.glob("*.*"))[:12]
+            beside = [one.name for one in file.parent.glob("*") if is_part(one.name)]
             remedy = suggest(file.name, beside, "put it there; beside it are") if beside else remedy
         raise SpecError(Problem(cause, where, remedy)) from None
 

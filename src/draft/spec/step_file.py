@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from draft.errors import counted
 from draft.extras import need
 from draft.spec.primitives.mesh import Mesh, MeshError, welded
 from draft.values import Array
@@ -48,7 +49,7 @@ def solids(data: bytes) -> Any:
         found = [*_each(whole, "SOLID")]
     if not found:
         count = 0 if whole.IsNull() else sum(1 for _ in _each(whole, "FACE"))
-        raise MeshError(f"no solid, only {count} faces", "export its body as a solid")
+        raise MeshError(f"no solid, only {counted(count, 'face')}", "export its body as a solid")
     compound = kernel("TopoDS").TopoDS_Compound()
     builder = kernel("BRep").BRep_Builder()
     builder.MakeCompound(compound)

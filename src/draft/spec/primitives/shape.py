@@ -8,8 +8,6 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import BeforeValidator, WithJsonSchema, model_validator
-from pydantic_core import PydanticCustomError
-
 from draft import geometry as g
 from draft.errors import Problem, ResolveError
 from draft.geometry import Rotation, Vector
@@ -30,10 +28,11 @@ _THINNEST = 1e-12  # of the box of an inertia, as a share of its squared diagona
 
 def _part_file(value: object) -> str:
     if not isinstance(value, str) or not _PART.fullmatch(value):
-        raise PydanticCustomError(
-            "part_file",
-            "expected the path of a .stl, .obj, .step or .stp file in the robot's folder, of "
-            "letters, digits, _ and -",
+        found = repr(value) if isinstance(value, str) else "this"
+        raise broken_rule(
+            f"{found} is no path of a part in the robot's folder",
+            "copy the .stl, .obj, .step or .stp file there, under a name of letters, digits, _ "
+            "and -, and write 'file: parts/NAME.stl'",
         )
     return value
 
@@ -61,7 +60,8 @@ class Shape(Model):
 
     file: PartFile
     """STL, OBJ or STEP file in the robot's folder, such as `parts/thigh.stl`: a closed mesh, or one
-    or more solids. STEP needs the extra `cad`."""
+    or more solids. STEP needs the extra `cad`; its mass properties are exact, and its drawing is
+    within 0.1 % of its diagonal."""
     unit: Literal["m", "cm", "mm", "in"] | None = None
     """Unit of the numbers of a mesh. Default: m. A STEP file states its own."""
     density: Number | None = None
@@ -112,6 +112,11 @@ class LinkShape(Shape):
     def weighs(self) -> bool:
         """Whether it states its mass."""
         return self.mass is not None or self.density is not None
+
+
+def is_part(file: str) -> bool:
+    """Whether a name can be that of a part."""
+    return _PART.fullmatch(file) is not None
 
 
 def is_step(file: str) -> bool:
