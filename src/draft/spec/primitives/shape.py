@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import BeforeValidator, WithJsonSchema, model_validator
+
 from draft import geometry as g
 from draft.errors import Problem, ResolveError
 from draft.geometry import Rotation, Vector
