@@ -107,6 +107,15 @@ states it is what the trends give without such values of the class.
         type: box
         joint: {{name: wrist_roll, axis: x, range: [-3, 3]}}
         box: {{size: [0.12, 0.08, 0.06], density: 900, shift: [0.06, 0, 0], site: grasp}}
+
+- A `shape` is a part of your own, a mesh or STEP, in place of a member, of the solid of a trunk, or
+  of the actuators of a class, in the frame of the link or of the actuator. Its mass is stated by
+  `mass`, by `density` or with `moments`; without any the laws keep it, spread over the part.
+
+      - name: thigh
+        joint: {{name: hip_pitch, axis: y, range: [-2, 2], actuator: leg}}
+        link: {{axis: -z, length: thigh_length, segment: thigh}}
+        shape: {{file: parts/thigh.stl, unit: mm, density: 2700}}
 """
 FINDINGS = """
 ## Findings

@@ -154,8 +154,8 @@ def sheet() -> bytes:
     """A STEP file of a face, which encloses nothing."""
     if importlib.util.find_spec("OCP") is None:
         return b""
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
-    from OCP.gp import gp_Pln
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace  # pyright: ignore[reportAttributeAccessIssue]
+    from OCP.gp import gp_Pln  # pyright: ignore[reportAttributeAccessIssue]
 
     return own_parts.step(BRepBuilderAPI_MakeFace(gp_Pln(), 0.0, 50.0, 0.0, 300.0).Face())
 

@@ -1,5 +1,7 @@
 """Robots with parts of their own, and the files of such parts, made here without Draft."""
 
+# pyright: reportAttributeAccessIssue=false
+# (The kernel's compiled modules carry no types.)
 from __future__ import annotations
 
 import io
@@ -122,7 +124,7 @@ def everything() -> draft.Spec:
     motor.apply_translation((0.01, 0.0, 0.005))
     inertia = {"com": [0.02, 0, 0.01], "moments": [0.05, 0.14, 0.16], "products": [0.01, 0.002, 0]}
     return with_parts(
-        {"hook.stl": stl(hook(1000)), "motor.obj": motor.export(file_type="obj").encode()}
+        {"hook.stl": stl(hook(1000)), "motor.obj": str(motor.export(file_type="obj")).encode()}
         | {"parts/box.stl": stl(box)},
         {"thigh": {"file": "hook.stl", "unit": "mm", "density": 2700}},
         {"file": "motor.obj"},

@@ -200,7 +200,7 @@ def test_roll_pitch_and_yaw_give_the_rotation_again(pitch: float) -> None:
 
 
 def test_the_trunks_mesh_is_closed_and_weighs_what_it_should(model: draft.Model) -> None:
-    read = trimesh.load(io.BytesIO(urdf.trunk_stl(model.design.trunk.loft)), file_type="stl")
+    read = trimesh.load(io.BytesIO(urdf.stl(model.design.trunk.loft)), file_type="stl")
     assert read.is_watertight
     trunk = model.design.trunk
     assert read.volume * float(trunk.density) == pytest.approx(float(trunk.mass), rel=1e-5)

@@ -345,7 +345,7 @@ def test_the_report_says_which_masses_are_stated_and_which_are_predicted() -> No
 
 def _width(design: draft.Design) -> float:
     low, high = design.mass_band()
-    return (high - low) / scalar(design.mass)
+    return scalar((high - low) / design.mass)
 
 
 def test_pages_and_the_command_line_show_the_parts(

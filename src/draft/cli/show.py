@@ -137,7 +137,8 @@ def _actuator(actuator: Actuator) -> Table:
 def _trunk(design: Design, trunk: TrunkPart) -> Text:
     """Return the law that the trunk weighs by, and how far such totals are off."""
     if trunk.density_stated:
-        return Text("trunk by its stated density\n", style="dim")
+        stated = "stated density" if trunk.shape is None else "own part"
+        return Text(f"trunk by its {stated}\n", style="dim")
     laws = structure_laws(design)
     error = f"totals of held-out {laws.name}s err by {laws.held_out_total:.2f} x"
     return Text(f"trunk by {trunk_words(design, trunk)}\n{error}\n", style="dim")

@@ -356,6 +356,7 @@ def size(
         part=part,
         origins=sizer.origin,
         laws=sizer.laws,
+        shape=None,
         **sizer.value,
     )
 

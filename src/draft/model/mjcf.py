@@ -77,7 +77,8 @@ def robot_element(design: Design) -> Element:
     """
     reuse = plan(design.spec).reuse(design.count)
     root, trunk = design.spec.root, design.lofted
-    if root is None or trunk is None:
+    # A trunk of one's own has whatever holds its parts.
+    if root is None or trunk is None or trunk.shape is not None:
         return _robot(design, ())
     held = [
         reuse.result(("bracket", i), _bracket, design.bodies[i], suffix, trunk.loft, root.axis)

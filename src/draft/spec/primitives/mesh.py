@@ -106,18 +106,16 @@ def closed(triangles: Array, name: str, file: str) -> Mesh:
     vertices, corners = welded(triangles)
     pairs = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, uses = np.unique(pairs, axis=0, return_counts=True)
-    if len(corners) == 0 or (bad := np.flatnonzero(uses != 2)).size:
-        at = (
-            ", ".join(f"{x:.4g}" for x in vertices[edges[bad[0]]].mean(axis=0))
-            if len(corners)
-            else ""
-        )
-        count = f"{len(bad)} of its edges belong" if len(corners) else "it has no surface"
-        near = f" to one triangle or to more than two, the first near [{at}] m" if at else ""
+    bad = np.flatnonzero(uses != 2)
+    if bad.size:
+        at = ", ".join(f"{x:.4g}" for x in vertices[edges[bad[0]]].mean(axis=0))
         raise MeshError(
-            f"the mesh is open: {count}{near}",
+            f"the mesh is open: {len(bad)} of its edges belong to one triangle or to more than "
+            f"two, the first near [{at}] m",
             "close it in the program that made it: every edge belongs to two triangles",
         )
+    if not len(corners):
+        raise MeshError("the triangles of the mesh have no area", "state its 'unit', or export it")
     import trimesh
 
     solid = trimesh.Trimesh(vertices, corners, process=False)
