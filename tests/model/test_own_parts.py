@@ -437,6 +437,17 @@ def test_a_part_far_from_the_size_of_its_link_has_another_unit() -> None:
     assert np.asarray(found.accepted).tolist() == [True, False]
 
 
+def test_a_part_whose_link_has_grown_is_reported() -> None:
+    chain = leg(thigh={"shape": {"file": "hook.stl", "density": 2700}})
+    chain[1]["link"]["length"] = "length"
+    spec = robot(chain, files={"hook.stl": stl(hook())}, parameters={"length": parameter(0.3)})
+    lengths = np.array([0.15, 0.2, 0.3, 0.4])
+    (finding,) = (f for f in spec.resolve({"length": lengths}).findings if f.id == "off_part")
+    assert np.asarray(finding.mask).tolist() == [True, False, False, True]  # it ends at 0.25 m
+    alone = [one.id for one in spec.resolve({"length": 0.4}).findings]
+    assert "off_part" in alone
+
+
 def test_moments_that_no_body_has_are_refused() -> None:
     stated = {"mass": 1.0, "com": [0, 0, 0], "moments": [1.0, 0.1, 0.1]}
     with pytest.raises(ResolveError, match="principal moment"):
