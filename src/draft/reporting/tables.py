@@ -159,7 +159,7 @@ def own_parts(subjects: Sequence[Subject]) -> Html | None:
             numbers = (one["mass_kg"], one["density_kg_m3"], 1e6 * one["volume_m3"])
             words = (one["file"], one["in_place_of"], str(len(one["bodies"])))
             rows.append([titled(subject), *words, *map(number, numbers), f"mass {origin}"])
-    return table(head, rows) if rows else None
+    return table(head, rows, "words") if rows else None
 
 
 _ORIGINS = {"stated": "stated", "trend": "predicted by laws", "catalogue": "of the catalogue"}
