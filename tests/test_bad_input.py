@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import importlib.util
+import math
 import os
 import re
 import sys
@@ -439,6 +440,8 @@ WORDS = {
     "part_with_moments_of_no_body": part(
         ", mass: 1, com: [0, 0, 0], moments: [1, 0.1, 0.1]", block_of()
     ),
+    "part_that_is_a_text": said(TREE, SHAPE, f"{SHAPE}      shape: part.stl\n"),
+    "part_of_points_that_are_no_numbers": part("", block_of(math.nan, 0.05, 0.3)),
     "part_without_a_member": part("", block_of(), link=""),
     "part_of_step_without_solids": part("", sheet(), name="part.step"),
     "part_of_step_with_a_unit": part(", unit: mm", sheet(), name="part.step"),

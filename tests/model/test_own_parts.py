@@ -27,10 +27,11 @@ from hypothesis import strategies as st
 import draft
 from draft.cli import main
 from draft.design.report import mass_by_origin, own_parts, report
-from draft.errors import ResolveError, SpecError
+from draft.errors import ModelError, ResolveError, SpecError
 from draft.extensions import Registry
 from draft.model.batch import build_batch
 from draft.spec.primitives.mesh import closed
+from draft.studio.skins import skins
 from draft.values import scalar
 from tests.helpers import DRIVE, leg, parameter, robot
 from tests.model import own_parts as written
@@ -405,6 +406,31 @@ def test_cad_gets_the_parts_with_their_volumes_on_both_sides(tmp_path: Path) -> 
     (row,) = (one for one in rows if one["name"] == "R_thigh")
     assert row["mass_source"] == "rod.step: stated"
     assert float(row["density_kg_m3"]) == pytest.approx(2700)
+
+
+def test_a_mesh_that_cad_would_take_minutes_for_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("OCP")
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.1)
+    shape = {"file": "ball.stl", "density": 200}
+    model = with_parts({"ball.stl": stl(ball)}, {"thigh": shape}).resolve().build()
+    with pytest.raises(ModelError, match="20480 triangles"):
+        model.save(tmp_path / "out", ("step",))
+    assert not any(tmp_path.iterdir())
+
+
+def test_the_studio_shows_the_parts_where_mujoco_has_them() -> None:
+    model = everything().resolve().build()
+    data = mujoco.MjData(model.mujoco)
+    mujoco.mj_kinematics(model.mujoco, data)
+    shown = np.vstack([skin.placed(data) for skin in skins(model).values()])
+    geoms = [g for g in range(model.mujoco.ngeom) if model.mujoco.geom_rgba[g, 3]]
+    meshes = [g for g in geoms if model.mujoco.geom_dataid[g] >= 0]
+    assert len(meshes) == 7  # the trunk, two thighs, four motors
+    for geom in meshes:
+        body = model.mujoco.geom_bodyid[geom]
+        own = _points(model.mujoco, geom) @ data.xmat[body].reshape(3, 3).T + data.xpos[body]
+        apart = np.linalg.norm(shown[:, None] - own[None], axis=2).min(axis=0)
+        assert apart.max() < 1e-6, model.mujoco.geom(geom).name
 
 
 def test_a_copy_of_a_robot_has_its_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,8 +42,8 @@ def save(
         folder: folder to write. Everything that Draft wrote there before is removed, so that all
             files are of one design.
         formats: names of `EXPORTERS`: "mjcf" is robot.xml and scene.xml; "urdf" is robot.urdf,
-            meshes/trunk.stl and actuators.json; "sdf" is robot.sdf, model.config and
-            meshes/trunk.stl; "glb" is robot.glb; "step" is robot.step and bom.csv.
+            meshes and actuators.json; "sdf" is robot.sdf, model.config and meshes; "glb" is
+            robot.glb; "step" is robot.step and bom.csv.
         more: text of further files by name, all of them known.
 
     Returns:

@@ -44,6 +44,7 @@ _SEWN = 1e-6  # Distance of edges that are one [mm].
 _SAME = 1e-6  # Relative difference of volumes, as of masses in MuJoCo.
 _AXIS = 0.1  # Length of an axis, as a share of the diagonal of the box around the robot.
 _AXIS_KIND = "drawn"
+_MOST = 10_000  # Triangles of a part, which the kernel sews in about 20 s.
 
 
 def robot_step(model: Model) -> bytes:
@@ -159,9 +160,15 @@ def _own(mesh: Mesh) -> Any:
     """Solid of a part of one's own.
 
     Raises:
-        ModelError: the solid is not that of the design, as of a surface that cuts itself.
+        ModelError: the solid is not that of the design, as of a surface that cuts itself, or the
+            mesh has too many triangles.
     """
     if mesh.step is None:
+        if len(mesh.corners) > _MOST:
+            raise ModelError(
+                f"'{mesh.file}' has {len(mesh.corners)} triangles, and its solid at most {_MOST}",
+                "export the part as STEP, or coarser",
+            )
         remedy = "mend it in the program that made it, or export it as STEP"
         faces = [*mesh.vertices[mesh.faces()]]
         return _sewn(faces, mesh.volume, f"'{mesh.file}'", remedy)

@@ -131,7 +131,7 @@ class Spec:
         Args:
             files: texts, or mappings of plain data, by the name that each has in a robot's folder:
                 `parameters.yaml`, `tree.yaml`, `root.yaml` unless the base is fixed, any
-                `designs/NAME.yaml`, and the laws and the table that `parameters.yaml` names.
+                `designs/NAME.yaml`, the laws and the table that `parameters.yaml` names, and parts.
 
         Raises:
             SpecError: listing every problem found, each with the name of its file and its line and

@@ -17,6 +17,7 @@ from draft.values import Array
 # Of MuJoCo, halved: a robot is compiled from text, and its page and report carry every triangle.
 MAX_TRIANGLES = 100_000
 _MIRRORS = "xyz"
+_FARTHEST = 1e5  # of a point from the origin [m]
 
 
 class MeshError(ValueError):
@@ -147,12 +148,17 @@ def welded(triangles: Array) -> tuple[Array, NDArray[np.int64]]:
         triangles: shape (n, 3, 3) [m].
 
     Raises:
-        MeshError: there are too many.
+        MeshError: there are too many, or one has a point far away.
     """
     if len(triangles) > MAX_TRIANGLES:
         raise MeshError(
             f"a mesh of {len(triangles)} triangles; the limit is {MAX_TRIANGLES}",
             "export it coarser",
+        )
+    if not np.abs(triangles).max(initial=0.0) < _FARTHEST:  # Nor is it no number.
+        raise MeshError(
+            f"a point of the mesh is no number, or beyond {_FARTHEST:.0e} m",
+            "export it again, or state its 'unit'",
         )
     import trimesh
 

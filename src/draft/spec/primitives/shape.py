@@ -72,6 +72,13 @@ class Shape(Model):
     """Whether its convex hull collides with the floor and with objects. Default: Draft's solid
     does."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _more_than_a_file(cls, data: object) -> object:
+        if isinstance(data, str):
+            raise broken_rule("expected a mapping, found a text", f"write '{{file: {data}}}'")
+        return data
+
     @model_validator(mode="after")
     def _step_states_its_unit(self) -> Self:
         if self.unit is not None and is_step(self.file):
