@@ -442,6 +442,12 @@ WORDS = {
     ),
     "part_that_is_a_text": said(TREE, SHAPE, f"{SHAPE}      shape: part.stl\n"),
     "part_of_points_that_are_no_numbers": part("", block_of(math.nan, 0.05, 0.3)),
+    "part_of_a_motor": said(TREE, "axis: y}", "axis: y, shape: {file: part.stl}}"),
+    "part_in_the_root_file": said(ROOT, "axis: x", "axis: x\nshape: {file: part.stl}"),
+    "part_that_is_a_folder": Mistake(
+        ((TREE, SHAPE, f"{SHAPE}      shape: {{file: part.stl}}\n"),),
+        spoil=lambda robot: (robot / "part.stl").mkdir(),
+    ),
     "part_without_a_member": part("", block_of(), link=""),
     "part_of_step_without_solids": part("", sheet(), name="part.step"),
     "part_of_step_with_a_unit": part(", unit: mm", sheet(), name="part.step"),
@@ -556,7 +562,7 @@ WORDS = {
 
 
 # Windows has no pipes in folders, and words of its own for a link to itself.
-NOT_ON_WINDOWS = {"pipe_for_a_file", "link_to_itself"}
+NOT_ON_WINDOWS = {"pipe_for_a_file", "link_to_itself", "part_that_is_a_folder"}
 
 
 @pytest.fixture(scope="module", autouse=True)

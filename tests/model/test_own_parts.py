@@ -14,6 +14,7 @@ import json
 import math
 import re
 import struct
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -478,6 +479,14 @@ def test_moments_that_no_body_has_are_refused() -> None:
     stated = {"mass": 1.0, "com": [0, 0, 0], "moments": [1.0, 0.1, 0.1]}
     with pytest.raises(ResolveError, match="principal moment"):
         with_parts({"h.stl": stl(hook())}, {"thigh": {"file": "h.stl", **stated}}).resolve()
+
+
+def test_without_the_extra_the_message_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.partition(".")[0] == "OCP"]:
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.setitem(sys.modules, "OCP", None)
+    with pytest.raises(SpecError, match=r"OCP is not installed, which reads STEP\n.*cad.*as STL"):
+        with_parts({"a.step": b"ISO-10303-21;"}, {"thigh": {"file": "a.step"}})
 
 
 def test_what_is_read_again_is_read_as_it_is_now(tmp_path: Path) -> None:

@@ -80,9 +80,10 @@ def _bytes(file: Readable, path: str, where: Location) -> bytes:
         return file.read_bytes()
     except OSError as error:
         cause = f"'{path}' cannot be read: {error.strerror}"
-        remedy = "put it there, in the robot's folder"
+        remedy = "give a file that can be read"
         if isinstance(file, Path) and isinstance(error, FileNotFoundError):
             cause = f"there is no file '{path}' in the robot's folder"
+            remedy = "put it there"
             beside = [one.name for one in file.parent.glob("*") if is_part(one.name)]
             remedy = suggest(file.name, beside, "put it there; beside it are") if beside else remedy
         raise SpecError(Problem(cause, where, remedy)) from None

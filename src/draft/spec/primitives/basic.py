@@ -126,6 +126,8 @@ AnyJoint = Annotated[
 class Member(Model):
     """The structural member of a link: a straight cylinder from the link's origin to its tip."""
 
+    absent: ClassVar[Mapping[str, str]] = {"shape": "write it beside 'link', not in it"}
+
     axis: Axis
     """Direction from origin to tip."""
     length: Number
@@ -206,6 +208,10 @@ class Motor(Model):
     is a cylinder about its axis. A servo is a box whose axis is near one end of it: half of its
     shorter edge across the axis from that end.
     """
+
+    absent: ClassVar[Mapping[str, str]] = {
+        "shape": "all actuators of a class have the same: write it in parameters.yaml, in the class"
+    }
 
     actuator: Name
     """Actuator class."""

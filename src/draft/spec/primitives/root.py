@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -71,6 +71,8 @@ class Section(Model):
 
 class RootFile(Model):
     """root.yaml: the trunk as a loft through sections."""
+
+    absent: ClassVar[Mapping[str, str]] = {"shape": "write it in tree.yaml, below 'type: root'"}
 
     axis: Literal["x", "y", "z"]
     """Direction of the loft."""
