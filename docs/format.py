@@ -16,7 +16,7 @@ from draft.laws.quantities import QUANTITIES
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
 from draft.spec.field_types import Model
-from draft.spec.primitives import LINKS, basic, fixed, root, wheel
+from draft.spec.primitives import LINKS, basic, fixed, root, shape, wheel
 from draft.spec.primitives.basic import LinkBase
 
 FILE = Path(__file__).parent / "format.md"
@@ -107,6 +107,15 @@ states it is what the trends give without such values of the class.
         type: box
         joint: {{name: wrist_roll, axis: x, range: [-3, 3]}}
         box: {{size: [0.12, 0.08, 0.06], density: 900, shift: [0.06, 0, 0], site: grasp}}
+
+- A `shape` is a part of your own, a mesh or STEP, in place of a member, of the solid of a trunk, or
+  of the actuators of a class, in the frame of the link or of the actuator. Its mass is stated by
+  `mass`, by `density` or with `moments`; without any the laws keep it, spread over the part.
+
+      - name: thigh
+        joint: {{name: hip_pitch, axis: y, range: [-2, 2], actuator: leg}}
+        link: {{axis: -z, length: thigh_length, segment: thigh}}
+        shape: {{file: parts/thigh.stl, unit: mm, density: 2700}}
 """
 FINDINGS = """
 ## Findings
@@ -126,7 +135,10 @@ ENDS: list[type[Model]] = [
 SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
     (
         "parameters.yaml",
-        (schema.ParametersFile, schema.Parameter, schema.ActuatorClass, schema.Battery),
+        (
+            *(schema.ParametersFile, schema.Parameter, schema.ActuatorClass, schema.Battery),
+            shape.Shape,
+        ),
     ),
     (
         "tree.yaml",
@@ -145,6 +157,7 @@ SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
             basic.Motor,
             basic.Pulley,
             *ENDS,
+            shape.LinkShape,
         ),
     ),
     ("root.yaml", (root.RootFile, root.Section)),

@@ -99,6 +99,12 @@ def _swing(folder: Path, path: Path) -> None:
     howto_figures.swing(folder, path)
 
 
+def _own_parts(folder: Path, path: Path) -> None:
+    """Draw the page's robot, and the one that it began as."""
+    with contextlib.chdir(folder):
+        row([open_design(name).build() for name in ("quadruped", "dog")], path, SIZE)
+
+
 def _padded(folder: Path, path: Path) -> None:
     """Draw the hopper on its ball, and on the pad of the example of an extension."""
     sys.path.insert(0, str(folder / "examples" / "extension"))
@@ -141,6 +147,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "ros": _ros,
     "to-a-machine": _machine,
     "before-you-switch-it-on": _swing,
+    "own-parts": _own_parts,
     "extend": _padded,
 }
 

@@ -78,11 +78,13 @@ def robot(
     allow: list[str] | None = None,
     population: str = "quadruped",
     chains: Mapping[str, list[dict[str, Any]]] | None = None,
+    trunk: Mapping[str, Any] | None = None,
+    files: Mapping[str, bytes] | None = None,
 ) -> draft.Spec:
     """A robot with one chain, `leg`, hung once from a box unless `children` says otherwise."""
     links = LEG if chain is None else chain
     hung = [{"chain": "leg", "at": [0, 0, -0.2]}] if children is None else children
-    files: dict[str, Any] = {
+    texts: dict[str, Any] = {
         "parameters.yaml": {
             "name": "tester",
             "population": population,
@@ -92,13 +94,14 @@ def robot(
         },
         "tree.yaml": {
             "chains": {"leg": links, **(chains or {})},
-            "tree": {"name": "trunk", "type": "root", "children": hung},
+            "tree": {"name": "trunk", "type": "root", **(trunk or {}), "children": hung},
         },
         "root.yaml": {**BOX, **(root or {})},
     }
     # Through JSON, so that a list used twice is written twice and not as an alias.
-    plain = json.loads(json.dumps(files))
-    return draft.Spec.parse({name: yaml.safe_dump(x, sort_keys=False) for name, x in plain.items()})
+    plain = json.loads(json.dumps(texts))
+    written = {name: yaml.safe_dump(x, sort_keys=False) for name, x in plain.items()}
+    return draft.Spec.parse({**written, **(files or {})})
 
 
 def wheeled(wheel: Mapping[str, Any] | None = None, **more: Any) -> draft.Spec:

@@ -27,6 +27,7 @@ GROUND = {
     "files",
     "extras",
     "lazy",
+    "meshes",
     "extensions",
     "offscreen",
     "mujoco_log",

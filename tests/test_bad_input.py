@@ -7,6 +7,8 @@ no traceback, writes nothing and ends within a second. `pytest --force-regen` ac
 from __future__ import annotations
 
 import gc
+import importlib.util
+import math
 import os
 import re
 import sys
@@ -16,9 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import trimesh
 from pytest_regressions.file_regression import FileRegressionFixture
 
 from draft.cli import main
+from tests.model import own_parts
 from tests.written import edit, files_below, write_robot
 
 PARAMETERS, TREE, ROOT, LONG = "parameters.yaml", "tree.yaml", "root.yaml", "designs/long.yaml"
@@ -116,6 +120,45 @@ def linked_outside(file: str) -> Callable[[Path], object]:
         (robot / file).symlink_to(Path("outside.yaml").resolve())
 
     return spoil
+
+
+SHAPE = "      link: {axis: -z, length: thigh_length, segment: thigh}\n"
+
+
+def part(words: str, content: bytes = b"", name: str = "part.stl", **more: str) -> Mistake:
+    """A part in place of the thigh is wrong."""
+
+    def spoil(robot: Path) -> None:
+        if content:
+            (robot / name).write_bytes(content)
+
+    shape = f"      shape: {{file: {name}{words}}}\n"
+    edits = ((TREE, SHAPE, more.get("link", SHAPE) + shape),)
+    return Mistake(edits, spoil=spoil)
+
+
+def block_of(*shape: float, wrong: str = "") -> bytes:
+    """An STL file of a box, of which a triangle may be "missing", or all are "inside out"."""
+    box = trimesh.creation.box(shape or (0.05, 0.05, 0.3))
+    if wrong == "missing":
+        box.update_faces([False] + [True] * 11)
+    elif wrong:
+        box.faces[: 1 if wrong == "turned" else 12] = box.faces[: 1 if wrong == "turned" else 12][
+            :, ::-1
+        ]
+    content = box.export(file_type="stl")
+    assert isinstance(content, bytes)
+    return content
+
+
+def sheet() -> bytes:
+    """A STEP file of a face, which encloses nothing."""
+    if importlib.util.find_spec("OCP") is None:
+        return b""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace  # pyright: ignore[reportAttributeAccessIssue]
+    from OCP.gp import gp_Pln  # pyright: ignore[reportAttributeAccessIssue]
+
+    return own_parts.step(BRepBuilderAPI_MakeFace(gp_Pln(), 0.0, 50.0, 0.0, 300.0).Face())
 
 
 def bomb() -> str:
@@ -377,6 +420,40 @@ WORDS = {
             "out",
         ),
     ),
+    # parts of one's own
+    "part_that_is_missing": part(""),
+    "part_in_another_folder": part("", name="../part.stl"),
+    "part_of_another_kind": part("", name="part.fbx"),
+    "part_that_is_open": part("", block_of(wrong="missing")),
+    "part_inside_out": part("", block_of(wrong="all")),
+    "part_with_a_turned_triangle": part("", block_of(wrong="turned")),
+    "part_of_1000_metres": part("", block_of(50, 50, 300)),
+    "part_of_a_third_of_a_millimetre": part(", unit: mm", block_of()),
+    "part_that_is_no_mesh": part("", b"solid of words"),
+    "part_of_an_unknown_unit": part(", unit: ft", block_of()),
+    "part_with_density_and_mass": part(", density: 2700, mass: 2", block_of()),
+    "part_of_a_link_with_mass": part(
+        ", density: 2700", block_of(), link=SHAPE.replace("segment: thigh", "mass: 2")
+    ),
+    "part_of_negative_density": part(", density: -2700", block_of()),
+    "part_with_moments_alone": part(", moments: [1, 1, 1]", block_of()),
+    "part_with_moments_of_no_body": part(
+        ", mass: 1, com: [0, 0, 0], moments: [1, 0.1, 0.1]", block_of()
+    ),
+    "part_that_is_a_text": said(TREE, SHAPE, f"{SHAPE}      shape: part.stl\n"),
+    "part_of_points_that_are_no_numbers": part("", block_of(math.nan, 0.05, 0.3)),
+    "part_of_a_motor": said(TREE, "axis: y}", "axis: y, shape: {file: part.stl}}"),
+    "part_in_the_root_file": said(ROOT, "axis: x", "axis: x\nshape: {file: part.stl}"),
+    "part_that_is_a_folder": Mistake(
+        ((TREE, SHAPE, f"{SHAPE}      shape: {{file: part.stl}}\n"),),
+        spoil=lambda robot: (robot / "part.stl").mkdir(),
+    ),
+    "part_without_a_member": part("", block_of(), link=""),
+    "part_of_step_without_solids": part("", sheet(), name="part.step"),
+    "part_of_step_with_a_unit": part(", unit: mm", sheet(), name="part.step"),
+    "part_of_a_class_with_mass_and_density": said(
+        PARAMETERS, "gear_ratio: 15", "mass: 1\n    shape: {file: part.stl, density: 2700}"
+    ),
     # actuators
     "one_stated_quantity": Mistake(
         ((PARAMETERS, "    no_load_speed: 20\n", ""), (PARAMETERS, "    gear_ratio: 15\n", ""))
@@ -485,7 +562,7 @@ WORDS = {
 
 
 # Windows has no pipes in folders, and words of its own for a link to itself.
-NOT_ON_WINDOWS = {"pipe_for_a_file", "link_to_itself"}
+NOT_ON_WINDOWS = {"pipe_for_a_file", "link_to_itself", "part_that_is_a_folder"}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -509,6 +586,8 @@ def test_a_mistake_is_explained(
 ) -> None:
     if sys.platform == "win32" and name in NOT_ON_WINDOWS:
         pytest.skip("needs another system")
+    if "_step_without" in name:
+        pytest.importorskip("OCP")
     work = tmp_path / "work"
     work.mkdir()
     monkeypatch.chdir(work)

@@ -41,6 +41,7 @@ NEEDS = {
     "howto/import": ("report",),
     "howto/levers": ("figures",),
     "howto/motors": (),
+    "howto/own-parts": (),
     "howto/page": ("page",),
     "howto/payload": ("report",),
     "howto/quadruped": ("explore",),

@@ -201,7 +201,7 @@ def test_roll_pitch_and_yaw_give_the_rotation_again(pitch: float) -> None:
 
 def test_the_trunks_mesh_is_closed_and_weighs_what_it_should(model: draft.Model) -> None:
     trunk = model.design.trunk
-    stl, obj = urdf.trunk_stl(trunk.loft), sdf.meshes(model.design)[sdf.TRUNK].encode()
+    stl, obj = urdf.stl(trunk.loft), sdf.meshes(model.design)["meshes/trunk.obj"].encode()
     for content, kind in ((stl, "stl"), (obj, "obj")):
         read = trimesh.load(io.BytesIO(content), file_type=kind)
         assert read.is_watertight

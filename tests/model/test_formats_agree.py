@@ -23,6 +23,7 @@ import draft
 from draft.model.urdf import LEAST_MASS
 from draft.values import scalar
 from tests.helpers import robot as robot_of
+from tests.model.own_parts import everything
 from tests.model.shipped import SHIPPED, built
 from tests.model.test_coupling import coupled_hand
 from tests.model.test_slides import telescope
@@ -30,7 +31,8 @@ from tests.model.test_slides import telescope
 Array = np.ndarray
 COUPLED = "coupled hand"
 SLIDE = "telescope"
-ROBOTS = [*SHIPPED, (COUPLED, None), (SLIDE, None)]
+PARTS = "own parts"
+ROBOTS = [*SHIPPED, (COUPLED, None), (SLIDE, None), (PARTS, None)]
 # Files have ten significant digits; MuJoCo keeps the vertices of a mesh in single precision.
 CLOSE, COARSE = 1e-7, 1e-6
 
@@ -244,6 +246,8 @@ READERS: list[Callable[[Path, dict[str, float], bool], Robot]] = [by_pinocchio, 
 def model_of(name: str, label: str | None) -> draft.Model:
     if name == COUPLED:
         return coupled_hand().resolve().build()
+    if name == PARTS:
+        return everything().resolve().build()
     if name == SLIDE:
         return robot_of(telescope()).resolve().build()
     return built(name, label)

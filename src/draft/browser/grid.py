@@ -223,7 +223,9 @@ def _fields(batch: ModelBatch) -> dict[str, Array]:
     )
     tensors = turned(moments, matrices(turns))
     fields[_TENSOR] = np.stack([tensors[:, i, j] for i, j in _ENTRIES], axis=-1).swapaxes(0, 1)
-    for geom in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH):
+    # Only that of the trunk changes; copies of a part share theirs.
+    trunk = (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH) & (model.geom_bodyid == 1)
+    for geom in np.flatnonzero(trunk):
         mesh = model.geom_dataid[geom]
         start = model.mesh_vertadr[mesh]
         rows = slice(start, start + model.mesh_vertnum[mesh])

@@ -100,7 +100,8 @@ export class Robot {
     model.opt.disableflags |= this.mujoco.mjtDisableBit.mjDSBL_MIDPHASE.value; // Its boxes turn.
     const found = this.tensors = tensors(model.body_inertia, model.body_iquat);
     for (let geom = 0; geom < model.ngeom; geom++) {
-      if (model.geom_type[geom] !== this.mujoco.mjtGeom.mjGEOM_MESH.value) continue;
+      // Copies of a part share their mesh, which stays.
+      if (model.geom_type[geom] !== this.mujoco.mjtGeom.mjGEOM_MESH.value || model.geom_bodyid[geom] !== 1) continue;
       const mesh = model.geom_dataid[geom], start = model.mesh_vertadr[mesh];
       const [w, x, y, z] = model.geom_quat.slice(4 * geom, 4 * geom + 4), place = model.geom_pos.slice(3 * geom, 3 * geom + 3);
       for (let i = 3 * start; i < 3 * (start + model.mesh_vertnum[mesh]); i += 3) {

@@ -14,12 +14,13 @@ from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, V
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
-from draft.design.report import actuator_rows, mass_parts
+from draft.design.report import actuator_rows, mass_by_origin, mass_parts, own_parts
 from draft.design.structure_law import structure_laws, trunk_words
 from draft.design.widened import mass_with_band
 from draft.spec.primitives.root import TrunkPart
 
 BAR = 28
+_ORIGINS = {"trend": "predicted"}
 
 
 def main(
@@ -136,7 +137,8 @@ def _actuator(actuator: Actuator) -> Table:
 def _trunk(design: Design, trunk: TrunkPart) -> Text:
     """Return the law that the trunk weighs by, and how far such totals are off."""
     if trunk.density_stated:
-        return Text("trunk by its stated density\n", style="dim")
+        stated = "stated density" if trunk.shape is None else "own part"
+        return Text(f"trunk by its {stated}\n", style="dim")
     laws = structure_laws(design)
     error = f"totals of held-out {laws.name}s err by {laws.held_out_total:.2f} x"
     return Text(f"trunk by {trunk_words(design, trunk)}\n{error}\n", style="dim")
@@ -159,4 +161,11 @@ def _masses(design: Design) -> Table:
     low, high = (f"{x:.1f}" for x in (mass.low, mass.high))
     why = f"wider: {', '.join(mass.wider)}" if mass.wider else ""
     table.add_row("90 % band", Text(f"{low} .. {high}"), "", Text(why, style="dim"))
+    if parts := own_parts(design):
+        for origin, kg in mass_by_origin(design).items():
+            files = ", ".join(
+                dict.fromkeys(one["file"] for one in parts if one["origin"] == origin)
+            )
+            share, note = kg / total, Text(files, style="dim")
+            table.add_row(_ORIGINS.get(origin, origin), f"{kg:.2f}", f"{100 * share:.0f}", note)
     return table

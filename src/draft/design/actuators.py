@@ -16,6 +16,7 @@ from draft.laws.limits import copper_loss
 from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantities
 from draft.laws.servos import usual_face_ratio
 from draft.laws.torque_speed import Line, stall_torque, torque_speed
+from draft.spec.primitives.shape import ShapePart
 from draft.values import (
     Value,
     brief,
@@ -64,7 +65,7 @@ class Actuator(Quantities):
 
     Torque and speed are at the output, rotor inertia on the motor side. Units: N m, rad/s, W, kg,
     m3, m, kg m2, N m s/rad. `laws` are those used for sizing; `part` is the catalogue part that it
-    starts from, and `like` its name.
+    starts from, and `like` its name; `shape` is a part of one's own in place of its solid.
 
     It is a linear motor whose current is limited: up to `corner_speed` it has its peak torque, and
     from there the torque falls to zero at the no-load speed. The corner is 0 unless one is stated:
@@ -75,6 +76,7 @@ class Actuator(Quantities):
     part: Part | None
     origins: Mapping[str, Origin]
     laws: Laws
+    shape: ShapePart | None = None
 
     def __repr__(self) -> str:
         shown = ("peak_torque", "no_load_speed", "gear_ratio", "mass")
@@ -128,6 +130,12 @@ class Actuator(Quantities):
     def is_box(self) -> bool:
         """Whether it is a box, as servos are; else a cylinder."""
         return self.kind == SERVO
+
+    @property
+    def longest(self) -> Value:
+        """Longest edge of its box, or of the box around its cylinder [m]."""
+        across = self.height if self.is_box else 2.0 * self.radius
+        return maximum(across, self.length)
 
     @property
     def surface(self) -> Value:
@@ -348,6 +356,7 @@ def size(
         part=part,
         origins=sizer.origin,
         laws=sizer.laws,
+        shape=None,
         **sizer.value,
     )
 

@@ -281,7 +281,9 @@ def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
             known = known + segment.mass * segment.copies
         else:
             so_far = by_trend.get(segment.trend, 0.0)
-            by_trend[segment.trend] = so_far + segment.mass * segment.copies
+            known = known + segment.of_parts * segment.copies
+            predicted = segment.mass - segment.of_parts
+            by_trend[segment.trend] = so_far + predicted * segment.copies
     for trend, mass in by_trend.items():
         spreads.append(Spread(mass, population.segments[trend].sigma))
     if design.lofted is None or design.lofted.density_stated:

@@ -44,6 +44,7 @@ KINDS: dict[str, str] = {
     "thermal": "standing in or holding the home pose needs more than the rated torque of a joint",
     "below_floor": "a part below the feet in the home pose, or of a fixed base below the floor",
     "off_tip": "links drawn longer than the distance between their joints, which counts",
+    "off_part": "a part of your own that ends far from the tip of its link",
     "trunk_section": "a section of the trunk beside the others by more than its own width",
     "unused_class": "an actuator class that no joint uses",
     # Of a simulation: `draft check --simulate`.

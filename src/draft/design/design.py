@@ -20,6 +20,7 @@ from draft.laws.structure import MIDDLE
 from draft.lazy import verb
 from draft.spec.primitives.base import Geom
 from draft.spec.primitives.root import TrunkPart
+from draft.spec.primitives.shape import ShapePart
 from draft.values import Mask, Value, brief, either, negate, some
 
 if TYPE_CHECKING:
@@ -80,6 +81,18 @@ class Body(NamedTuple):
         return self.member_mass + self.end_mass + motor
 
     @property
+    def member_com(self) -> Vector:
+        """Centre of mass of its member, or of the part in its place [m]."""
+        shape = self.link.shape
+        return g.scale(self.link.tip, self.member_centre) if shape is None else shape.com
+
+    @property
+    def shapes(self) -> tuple[tuple[str, ShapePart], ...]:
+        """Parts that it has in place of its own solid and of its actuator, each with the place."""
+        parts = ("link", self.link.shape), ("motor", self.actuator and self.actuator.shape)
+        return tuple((place, part) for place, part in parts if part is not None)
+
+    @property
     def carries(self) -> bool:
         """Whether the end of its link is carried, not part of a segment."""
         end = self.link.end
@@ -109,24 +122,32 @@ class Body(NamedTuple):
 
     def link_solids(self) -> Iterator[Geom]:
         """Solids of the link itself: member and end."""
+        return (geom for geom, _ in self.replaced())
+
+    def replaced(self) -> Iterator[tuple[Geom, ShapePart | None]]:
+        """Solids of the link itself, each with the part in its place, if any."""
         if (member := self.link.member) is not None:
-            yield member.geom(self.link.tip, self.member_radius, self.member_mass)
+            rod = member.geom(self.link.tip, self.member_radius, self.member_mass)
+            yield rod, self.link.shape
         if (end := self.end_geom) is not None:
-            yield end
+            yield end, None
 
     def geoms(self) -> Iterator[Geom]:
-        """Solids that are drawn: member, actuator, pulley and end.
+        """Solids of a model: member, actuator, pulley and end, or parts in place of the former.
 
         A member whose centre of mass is not in its middle is two halves of different densities;
         for N designs, if that holds for any of them.
         """
         link, mass, radius = self.link, self.member_mass, self.member_radius
-        if link.member is not None and some(self.member_centre != MIDDLE):
+        if link.member is not None and link.shape is not None:
+            yield from link.shape.geoms(link.member.geom(link.tip, radius, mass))
+        elif link.member is not None and some(self.member_centre != MIDDLE):
             yield from link.member.halves(link.tip, radius, mass, self.member_centre)
         elif link.member is not None:
             yield link.member.geom(link.tip, radius, mass)
-        if (motor := self.motor_geom) is not None:
-            yield motor
+        if (motor := self.motor_geom) is not None and link.motor is not None:
+            shape = self.actuator and self.actuator.shape
+            yield from (motor,) if shape is None else shape.geoms(motor, *link.motor.frame)
         if link.pulley is not None:
             yield link.pulley.geom(link.tip)
         if (end := self.end_geom) is not None:
@@ -168,6 +189,7 @@ class SegmentMass:
             segment has the centre of its class; None if that is unknown.
         bodies: names of the members of the first copy.
         copies: number of copies.
+        of_parts: share of its mass that parts of one's own state, of one copy [kg].
     """
 
     label: str
@@ -178,6 +200,7 @@ class SegmentMass:
     member_centre: Value | None
     bodies: tuple[str, ...]
     copies: int
+    of_parts: Value = 0.0
 
 
 @dataclass(frozen=True, repr=False)

@@ -17,7 +17,7 @@ from draft.design import filter_units
 from draft.design.checks import extended, kinds
 from draft.design.design import Design, SegmentMass
 from draft.design.filter_actuators import ROUNDING, actuator, unused, used
-from draft.design.filter_shape import below_floor, feet, off_tip, sections
+from draft.design.filter_shape import below_floor, feet, off_part, off_tip, sections
 from draft.design.findings import Finding, each, note
 from draft.design.legs import count, coupled_bodies
 from draft.design.loads import home_loads
@@ -74,10 +74,17 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         *below_floor(design, plan, home),
         *each("sections", partial(sections, design), [one.loft for one in trunks], reuse),
         *off_tip(design, plan),
+        *each("part", off_part, [design.bodies[i] for i in _firsts(plan)], reuse),
         *unused(design),
         *extended(design),
     ]
     return tuple(with_allowance(_whole_mask(finding, design), design) for finding in found)
+
+
+def _firsts(plan: Plan) -> list[int]:
+    """First body of each link that has a part of one's own."""
+    shaped = (k for k, link in enumerate(plan.links) if link.shape is not None)
+    return [plan.link_of.index(k) for k in shaped]
 
 
 def _whole_mask(finding: Finding, design: Design) -> Finding:

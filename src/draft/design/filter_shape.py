@@ -8,17 +8,19 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from draft import geometry as g
-from draft.design.design import Design
+from draft.design.design import Body, Design
 from draft.design.findings import Finding, note
 from draft.design.plan import Plan
 from draft.design.solids import Pose, Solid, depth, foot_depths, trunk_depths
 from draft.spec.primitives.loft import Loft
-from draft.values import Value, maximum, minimum, some
+from draft.values import Value, either, maximum, minimum, some
 
 # Reported difference of the heights of feet: share of the deepest, and at least [m].
 EVEN, LEAST_UNEVEN = 0.02, 0.005
 # Reported distance of a section of the trunk from the next, in widths of the section.
 FAR_OFF = 1.0
+# Ends of a part along its link that are not reported, as shares of the link's length.
+PART_ENDS = 0.75, 1.5
 
 
 def feet(design: Design, plan: Plan, home: Pose) -> Iterator[Finding]:
@@ -126,6 +128,28 @@ def off_tip(design: Design, plan: Plan) -> Iterator[Finding]:
             weighed.length,
             "m",
         )
+
+
+def off_part(body: Body) -> Iterator[Finding]:
+    """Compare the end of a part of one's own with the tip of its link, which may have moved."""
+    member, shape = body.link.member, body.link.shape
+    if member is None or shape is None:
+        return
+    along = np.stack(np.broadcast_arrays(*member.axis))
+    reach = np.max(shape.mesh.vertices @ along, axis=0)
+    value: Value = reach if np.ndim(reach) else float(reach)
+    short, long = (share * member.length for share in PART_ENDS)
+    yield from note(
+        "off_part",
+        body.name,
+        either(value < short, value > long),
+        f"'{shape.mesh.file}' of '{body.name}' ends at {{value}} along its link, whose tip is at "
+        "{limit}: a part does not grow with its link",
+        "tree.yaml",
+        value,
+        member.length,
+        "m",
+    )
 
 
 def sections(design: Design, loft: Loft) -> Iterator[Finding]:

@@ -313,7 +313,8 @@ def moments(design: Design, frames: Mapping[int, Frame]) -> dict[int, Vector]:
 def _first_moment(body: Body) -> Vector:
     """Mass times centre of mass of a body in its own frame [kg m]."""
     link = body.link
-    moment = g.scale(link.tip, body.member_mass * body.member_centre + body.end_mass)
+    moment = g.scale(body.member_com, body.member_mass)
+    moment = g.add(moment, g.scale(link.tip, body.end_mass))
     if link.end is not None and link.end.center is not g.ZERO:
         moment = g.add(moment, g.scale(link.end.center, body.end_mass))
     if (motor := body.motor_geom) is not None and motor.mass is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,10 +14,13 @@ from draft.spec import links, tree
 from draft.spec.evaluate import Evaluator
 from draft.spec.primitives.base import End
 from draft.spec.primitives.basic import MemberPart, MotorPart, PulleyPart
+from draft.spec.primitives.mesh import Mesh
+from draft.spec.primitives.shape import ShapePart
 from draft.spec.primitives.wheel import WheelPart
 from draft.spec.tree import UNMIRRORED, Signs
 from draft.values import Value, is_array, maximum, minimum, scalar
 
+Meshes = Mapping[tuple[str, str | None], Mesh]
 TURN = (-math.pi, math.pi)  # Angles of a wheel that sliders and poses have [rad].
 _ALONG = 1e-6
 
@@ -100,7 +104,10 @@ class Joint(NamedTuple):
 
 
 class Link(NamedTuple):
-    """Numbers of a link in its own frame; `tip` is the end of its member [m]."""
+    """Numbers of a link in its own frame.
+
+    `tip` is the end of its member [m], and `shape` a part in place of the member, or of the trunk.
+    """
 
     name: str
     joint: Joint | None
@@ -109,6 +116,7 @@ class Link(NamedTuple):
     pulley: PulleyPart | None
     end: End | None
     tip: Vector
+    shape: ShapePart | None = None
 
 
 class Placement(NamedTuple):
@@ -125,19 +133,25 @@ def read_placement(placement: tree.Placement, r: Evaluator) -> Placement:
     return Placement(at, rotation)
 
 
-def read_link(link: links.Link, r: Evaluator) -> Link:
-    """Evaluate a link.
+def read_link(link: links.Link, meshes: Meshes, r: Evaluator) -> Link:
+    """Evaluate a link; `meshes` are those of its spec.
 
     Raises:
         ResolveError: a length is not positive, a joint range is empty, an axis is zero, a wheel
-            does not turn about its own axis, or a motor's long side is along its axis.
+            does not turn about its own axis, a motor's long side is along its axis, or a part
+            has not about the size of what it replaces.
     """
     name = link.name
-    member = motor = pulley = end = None
+    member = motor = pulley = end = shape = None
     tip = along = g.ZERO
     if link.member is not None:
         member = MemberPart.read(link.member, name, r)
         along, tip = member.axis, g.scale(member.axis, member.length)
+    if link.shape is not None:
+        fields = link.shape.fields
+        shape = ShapePart.read(link.shape, meshes[fields.file, fields.unit], name, r)
+        if member is not None:
+            shape.check_size(link.shape, member.length, f"the member of {name}", r)
     if link.motor is not None:
         motor = MotorPart.read(link.motor, name, along, tip, r)
     if link.pulley is not None:
@@ -150,7 +164,7 @@ def read_link(link: links.Link, r: Evaluator) -> Link:
             what = f"sine of the angle between the axes of wheel '{name}' and joint '{joint.name}'"
             rule = "must be 0, as a wheel turns about its own axis"
             r.require(off < _ALONG, link.end.triple("axis")[0], what, off, rule)
-    return Link(name, joint, member, motor, pulley, end, tip)
+    return Link(name, joint, member, motor, pulley, end, tip, shape)
 
 
 def mirrored(link: Link, signs: Signs) -> Link:
@@ -170,6 +184,7 @@ def mirrored(link: Link, signs: Signs) -> Link:
         link.pulley and link.pulley.mirrored(signs),
         link.end and link.end.mirrored(signs),
         g.reflect(link.tip, signs),
+        link.shape and link.shape.mirrored(signs),
     )
 
 

@@ -189,7 +189,9 @@ def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Se
         member = body.link.member
         if not body.link.structural:
             continue
-        if member is not None and "mass" in member.numbers:
+        classed = member is not None and member.fields.segment is not None
+        stated = member is not None and "mass" in member.numbers
+        if stated or (body.link.states_mass and not classed):
             groups[(base[i], i)] = [i]
             continue
         name = (member.fields.segment if member else None) or leading[base[i]]

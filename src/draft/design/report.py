@@ -22,7 +22,7 @@ from draft.laws.quantities import CORNER, QUANTITIES, Quantity
 from draft.laws.structure import Centre, Population, link_laws
 from draft.spec.load import load
 from draft.spec.schema import STATED, TREND
-from draft.values import Value, plain, scalar
+from draft.values import Value, plain, scalar, some
 
 # Relative difference of masses that are equal but for rounding.
 SAME = 1e-9
@@ -51,6 +51,7 @@ def report(design: Design) -> dict[str, Any]:
         "actuator_mass_kg": design.actuator_mass,
         "structure_mass_kg": design.structure_mass,
         "carried_mass_kg": design.carried_mass,
+        "mass_by_origin_kg": mass_by_origin(design),
         "n_joints": len(design.joints),
         "accepted": design.accepted,
         "findings": [finding.record() for finding in design.findings],
@@ -66,6 +67,7 @@ def report(design: Design) -> dict[str, Any]:
         "end_density_kg_m3": _end_density(population),
         "segments": [_segment(segment, population) for segment in design.segments],
         "carried": [_carried(name, of) for name, of in carried_parts(design).items()],
+        "own_parts": own_parts(design),
         "bodies": design.body_masses(),
     }
 
@@ -246,6 +248,57 @@ def carried_parts(design: Design) -> dict[str, list[Body]]:
     return found
 
 
+def mass_by_origin(design: Design) -> dict[str, Value]:
+    """Mass of a design [kg] that is stated, that laws predict, and that a catalogue has."""
+    found: dict[str, Value] = {"stated": design.carried_mass, "trend": 0.0, "catalogue": 0.0}
+
+    def add(origin: str, mass: Value) -> None:
+        kind = origin if origin in found else "trend"
+        found[kind] = found[kind] + mass
+
+    for body in design.bodies:
+        if (actuator := body.actuator) is not None:
+            add(actuator.origins["mass"].kind, actuator.mass)
+    for segment in design.segments:
+        of_parts = segment.mass if segment.trend is None else segment.of_parts
+        add("stated", of_parts * segment.copies)
+        add("trend", (segment.mass - of_parts) * segment.copies)
+    trunk = design.lofted
+    add("stated" if trunk is None or trunk.density_stated else "trend", design.base_mass)
+    return found
+
+
+def own_parts(design: Design) -> list[dict[str, Any]]:
+    """Records of the parts in place of drawn solids, each with the bodies that have it."""
+    records: dict[tuple[str, str], dict[str, Any]] = {}
+    for body in design.bodies:
+        for place, part in body.shapes:
+            mass, of = body.member_mass, body.link.name
+            origin = "trend" if part.mass is None else "stated"
+            if place == "motor" and (actuator := body.actuator) is not None:
+                mass, of, origin = actuator.mass, actuator.name, actuator.origins["mass"].kind
+            elif body.parent is None and design.lofted is not None:
+                mass = design.lofted.mass
+            mesh = part.mesh
+            record = records.setdefault(
+                (place, of),
+                {
+                    "file": mesh.file,
+                    "in_place_of": f"{'actuator' if place == 'motor' else 'link'} {of}",
+                    "bodies": [],
+                    "mass_kg": mass,
+                    "origin": origin,
+                    "volume_m3": mesh.volume,
+                    "density_kg_m3": mass / mesh.volume,
+                    "com_m": list(part.com),
+                    "triangles": len(mesh.corners),
+                    "collides": part.collides,
+                },
+            )
+            record["bodies"].append(body.name)
+    return [*records.values()]
+
+
 def _by_leg_length(design: Design, population: Population) -> dict[str, Any] | None:
     """Second estimate of the total mass, with the structure predicted from leg length alone.
 
@@ -314,11 +367,14 @@ def _trunk(design: Design, population: Population) -> dict[str, Any] | None:
     if leg is not None:
         origin["inputs"] = {"volume": trunk.loft.volume, "leg_length": leg}
         origin["leg_length_origin"] = "design" if trunk.leg_length is None else "stated"
+    solid = trunk.loft if trunk.shape is None else trunk.shape.mesh
+    if trunk.shape is not None and trunk.shape.mass is not None:
+        origin["from"] = trunk.shape.mesh.file
     return {
         "mass_kg": trunk.mass,
         "volume_m3": trunk.loft.volume,
-        "com_m": trunk.loft.com.tolist(),
-        "inertia_kg_m2": (trunk.loft.inertia * trunk.density).tolist(),
+        "com_m": solid.com.tolist(),
+        "inertia_kg_m2": (solid.inertia * (trunk.mass / solid.volume)).tolist(),
         "density_kg_m3": {"value": trunk.density} | origin,
     }
 
@@ -341,6 +397,8 @@ def _segment(segment: SegmentMass, population: Population) -> dict[str, Any]:
         "length_m": segment.length,
         "mass_kg": segment.mass,
     }
+    if some(segment.of_parts > 0):
+        record["of_own_parts_kg"] = segment.of_parts
     if segment.trend is None:
         return record | {"origin": "stated"}
     trend = population.segments[segment.trend]

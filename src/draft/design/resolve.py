@@ -44,6 +44,7 @@ from draft.spec.links import Link as WrittenLink
 from draft.spec.payload import PLACE
 from draft.spec.primitives.loft import Loft
 from draft.spec.primitives.root import TrunkPart, make_trunk
+from draft.spec.primitives.shape import ShapePart
 from draft.spec.spec import ActuatorClass, Parameter
 from draft.spec.tree import Signs
 from draft.values import Value, exp, is_array, some
@@ -157,9 +158,11 @@ class _Resolver:
             top = self.reuse.result("top", top_of, trunk.loft)
             self.env.update(zip(PLACE, top, strict=True))
         links = [
-            self.read(("link", i), partial(read_link, link, self.r), reads)
+            self.read(("link", i), partial(read_link, link, spec.meshes, self.r), reads)
             for i, (link, reads) in enumerate(zip(p.links, p.link_reads, strict=True))
         ]
+        if trunk is not None and (part := links[p.link_of[0]].shape) is not None:
+            trunk = self.of_part(trunk, part)
         placements = [
             self.read(("placement", i), partial(read_placement, placement, self.r), reads)
             for i, (placement, reads) in enumerate(
@@ -197,6 +200,21 @@ class _Resolver:
         judged = replace(design, findings=inspect(design, p, self.r.invalid))
         hand_on(design, judged)
         return judged
+
+    def of_part(self, trunk: TrunkPart, part: ShapePart) -> TrunkPart:
+        """The trunk with a part in place of its solid."""
+        written = self.spec.bodies[0].link.shape
+        if written is not None:
+            low, high = (of(trunk.loft.vertices, axis=0) for of in (np.min, np.max))
+            longest = np.max(high - low, axis=0)
+            part.check_size(
+                written, longest if longest.ndim else float(longest), "the trunk", self.r
+            )
+        trunk = replace(trunk, shape=part)
+        if part.mass is None:
+            return trunk
+        density = part.mass / trunk.loft.volume
+        return replace(trunk, mass=part.mass, density=density, density_stated=True)
 
     def electronics(self, stated: Expression | None) -> Value | None:
         return None if stated is None else self.r.positive(stated, "the power of the electronics")
@@ -290,6 +308,9 @@ class _Resolver:
             given = name in table.like
             where = table.place(f"actuators.{name}.like") if given else actuator.like_where
             raise ResolveError(Problem(problem.cause, where, problem.remedy)) from None
+        shape = self.shape(actuator)
+        if shape is not None and shape.mass is not None:
+            stated.setdefault("mass", shape.mass)
         by_trend = self.reuse.equal((name, "by trend"), table.predicted(actuator))
         names = self.reuse.equal((name, "stated"), tuple(stated))
         numbers = (self.reuse.equal((name, each), value) for each, value in stated.items())
@@ -297,7 +318,10 @@ class _Resolver:
         def sized(*_: object) -> Actuator:
             errors = self.errors.actuators.get(name)
             laws = servo_laws() if kind == SERVO else self.plan.laws
-            return size(name, stated, part, actuator.where, laws, errors, by_trend)
+            found = size(name, stated, part, actuator.where, laws, errors, by_trend)
+            if shape is not None and actuator.shape is not None:
+                shape.check_size(actuator.shape, found.longest, f"the solid of {name}", self.r)
+            return replace(found, shape=shape)
 
         try:
             return self.reuse.result((name, "sized"), sized, part, by_trend, names, *numbers)
@@ -305,6 +329,13 @@ class _Resolver:
             raise ResolveError(
                 Problem(f"the numbers of actuator '{name}' are too large", actuator.where)
             ) from None
+
+    def shape(self, actuator: ActuatorClass) -> ShapePart | None:
+        """Part in place of an actuator class."""
+        if (written := actuator.shape) is None:
+            return None
+        mesh = self.spec.meshes[written.fields.file, written.fields.unit]
+        return ShapePart.read(written, mesh, actuator.name, self.r)
 
     def check_rated(self, sized: Actuator, actuator: ActuatorClass) -> None:
         """Check that a stated rated torque is not above the peak torque."""
@@ -406,7 +437,7 @@ class _Resolver:
 
     def check_long(self, link: WrittenLink, actuator: Actuator | None) -> None:
         """Check that a stated long side is that of a box."""
-        if link.motor is None or actuator is None or actuator.is_box:
+        if link.motor is None or actuator is None or actuator.is_box or actuator.shape:
             return
         if link.motor.fields.long is not None:
             raise ResolveError(

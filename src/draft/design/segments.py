@@ -66,11 +66,14 @@ def weigh(
     """Mass of a segment, predicted from its length or stated, and its distribution.
 
     The sphere or plate at the end takes its mass first; the members share the rest by length. An
-    end with a stated mass above that of the segment increases the mass of the segment.
+    end with a stated mass above that of the segment increases the mass of the segment, and a part
+    of one's own has its own mass in place of the share of its member.
     """
     own = [skeleton.links[i] for i in segment.members]
     length = _length(segment, skeleton, r)
+    parts = [link.shape.mass if link.shape else None for link in own]
     stated = own[0].member.mass if own[0].member else None
+    stated = parts[0] if stated is None else stated
     if segment.trend is None and stated is not None:
         mass = stated
     else:
@@ -89,13 +92,19 @@ def weigh(
         ends = [mass / len(own) for _ in own]
     else:
         members = [rest * length / span for length in lengths]
+    # A part has its own mass, and leaves the others and the end what they have without it.
+    members = [m if part is None else part for m, part in zip(members, parts, strict=True)]
     names = tuple(skeleton.spec.bodies[i].name for i in segment.members)
     mass = g.total(members) + g.total(ends)
     written = skeleton.spec.bodies[segment.members[0]].link.member
     kind = segment.trend or (written.fields.segment if written else None)
     copies = len(segment.copies)
     centre = _member_centre(segment, own, members[0], ends[0], skeleton)
-    weighed = SegmentMass(segment.label, segment.trend, kind, length, mass, centre, names, copies)
+    of_parts = g.total(part for part in parts if part is not None)
+    by_law = any(part is None for part in parts)
+    by_law = by_law or any(k.end and k.end.of_segment and k.end.mass is None for k in own)
+    trend = segment.trend if by_law else None
+    weighed = SegmentMass(segment.label, trend, kind, length, mass, centre, names, copies, of_parts)
     return Weighed(weighed, members, ends)
 
 
@@ -104,11 +113,11 @@ def _member_centre(
 ) -> Value | None:
     """Centre of a member such that its segment, with the end at its tip, has that of the class.
 
-    A share of the length of the member; None if the centre of the class is unknown or the segment
-    has several members.
+    A share of the length of the member; None if the centre of the class is unknown, the segment
+    has several members, or the member is a part, which has its own.
     """
     known = skeleton.plan.population.centres.get(segment.trend or "")
-    if known is None or len(own) > 1 or own[0].member is None:
+    if known is None or len(own) > 1 or own[0].member is None or own[0].shape is not None:
         return None
     centre = known.value
     return clip(centre - (1.0 - centre) * end / maximum(member, LIGHTEST), *CENTRES)

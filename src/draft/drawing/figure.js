@@ -49,6 +49,7 @@ export class Figure {
     this.parts = new Map();
     for (let geom = 0; geom < model.ngeom; geom++) {
       const type = model.geom_type[geom], body = model.geom_bodyid[geom];
+      if (model.geom_rgba[4 * geom + 3] === 0) continue; // It only collides, or has an inertia.
       if (type !== MESH && !UNIT[type]) continue;
       if (!this.parts.has(body)) {
         const shape = new THREE.BufferGeometry();

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.model.batch_layout import TYPES, Geoms, Index, Layout
 from draft.model.decimals import rounded
-from draft.model.principal import apply, matrices, off_centre, principal, product, turned
+from draft.model.principal import apply, composed, matrices, off_centre, principal, product, turned
 from draft.spec.primitives.loft import Loft
 from draft.values import Array
 
@@ -125,9 +125,13 @@ class Compiler:
         quat = _unit(table[geoms.quat][..., : 1 if self.aligned else None])
         volume, moments = _measures(geoms, size)
         frames = quat
-        if self.loft is not None:
+        # Parts of one's own weigh nothing: boxes have their inertia.
+        lofts = self.meshes[~geoms.massless[self.meshes]]
+        parts = self.meshes[geoms.massless[self.meshes]]
+        volume[parts], moments[parts] = 1.0, 0.0
+        if self.loft is not None and len(lofts):
             frames = np.repeat(quat, size.shape[-1] // quat.shape[-1], axis=-1)
-            for k in self.meshes:
+            for k in lofts:
                 volume[k], pos[k], frames[k], moments[k] = _mesh(self.loft, rows)
         sound = (volume[self.solids] > 0).all(axis=0)
         sound &= (volume[self.meshes] > _LEAST_VOLUME).all(axis=0)
@@ -136,18 +140,23 @@ class Compiler:
         bodies = self._bodies(mass, pos, quat, frames, moments)
         self._place_massless(bodies, table)
         radius, half = _around(geoms, size)
-        # The template's mesh has its own place and box.
+        # The template's mesh has its own place and box; a part moves with its geom.
+        t = self.template
         for k in self.meshes:
             own = geoms.ids[k]
-            pos[k] = self.template.geom_pos[own, :, None]
-            quat[k] = self.template.geom_quat[own, :, None]
-            half[k] = self.template.geom_aabb[own, 3:, None]
+            half[k] = t.geom_aabb[own, 3:, None]
+            if k in parts:
+                mesh = t.geom_dataid[own]
+                pos[k] += apply(matrices(quat[k]), t.mesh_pos[mesh, :, None])
+                quat[k] = composed(quat[k], t.mesh_quat[mesh, :, None])
+            else:
+                pos[k], quat[k] = t.geom_pos[own, :, None], t.geom_quat[own, :, None]
         ids, solid = geoms.ids[self.solids], self.solids
-        whole = slice(None)
+        whole, moved = slice(None), np.concatenate([solid, parts])
         patches = [
             Patch("geom_size", False, ids, whole, size[solid]),
-            Patch("geom_pos", False, ids, whole, pos[solid]),
-            Patch("geom_quat", False, ids, whole, quat[solid]),
+            Patch("geom_pos", False, geoms.ids[moved], whole, pos[moved]),
+            Patch("geom_quat", False, geoms.ids[moved], whole, quat[moved]),
             Patch("geom_rbound", False, ids, whole, radius[solid]),
             Patch("geom_aabb", False, ids, slice(3, 6), half[solid]),
             *self._body_patches(bodies),
@@ -156,7 +165,6 @@ class Compiler:
         same = self._same_frames(bodies)
         patches.append(Patch("body_sameframe", False, np.arange(1, len(same)), whole, same[1:]))
         # A body that floats alone has a diagonal M(q) if its frames agree, which MuJoCo relies on.
-        t = self.template
         simple = np.flatnonzero(t.body_simple[1:]) + 1
         sound &= (same[simple] == t.body_sameframe[simple, None]).all(axis=0)
         return patches, bodies.mass, sound & self._accepted(bodies)

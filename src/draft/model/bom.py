@@ -69,12 +69,18 @@ def _links(design: Design, record: Mapping[str, Any]) -> Iterator[dict[str, obje
         for body in copy
     }
     for i, body in enumerate(design.bodies):
-        solids = [*body.link_solids()]
-        mass = body.member_mass + body.end_mass
+        mass, part = body.member_mass + body.end_mass, body.link.shape
+        solids = [geom if own is None else own.mesh for geom, own in body.replaced()]
         volume = g.total(solid.volume for solid in solids)
         sources = [_source(segments[i])] if i in segments else []
+        if part is not None:
+            stated = part.mass is not None
+            alone = stated and body.end_mass == 0  # Else the law has the end.
+            words = f"{part.mesh.file}: {'stated' if stated else 'drawn'}"
+            sources = [words] if alone else [words, *sources]
         if i == 0 and (trunk := design.lofted) is not None:
-            mass, volume = mass + trunk.mass, volume + trunk.loft.volume
+            solid = trunk.loft if part is None else part.mesh
+            mass, volume = mass + trunk.mass, volume + solid.volume
             sources.append(f"density: {_source(record['trunk']['density_kg_m3'])}")
         if body.end_mass and (body.carries or body.parent is None):
             sources.append("end stated")

@@ -22,12 +22,11 @@ def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = 
     Args:
         design: a single design, or its model if that is built already.
         folder: folder to write, atomically; files that Draft wrote there before are replaced.
-        formats: "urdf" (robot.urdf, meshes/trunk.stl and actuators.json with what URDF cannot
+        formats: "urdf" (robot.urdf, meshes and actuators.json with what URDF cannot
             hold: armature [kg m2], gains [N m/rad, N m s/rad]), "glb" (robot.glb, lengths in m),
-            "mjcf" (robot.xml, scene.xml), "sdf" (robot.sdf, model.config, meshes/trunk.obj),
-            "step" (robot.step in mm and bom.csv; extra `cad`), "mjlab" (mjlab_robot.py and
-            robot.xml), "isaaclab" (isaaclab_robot.py, robot.urdf and meshes/trunk.stl), and those
-            of extensions.
+            "mjcf" (robot.xml, scene.xml), "sdf" (robot.sdf, model.config, meshes), "step"
+            (robot.step in mm and bom.csv; extra `cad`), "mjlab" (mjlab_robot.py and robot.xml),
+            "isaaclab" (isaaclab_robot.py, robot.urdf and meshes), and those of extensions.
 
     Returns:
         The folder.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +32,7 @@ class Exporter:
     Attributes:
         name: name in commands.
         doc: description, one sentence.
-        files: paths of its files in the folder of a model.
+        files: paths of its files in the folder of a model, or patterns of them.
         function: function from a model to the contents of some of these files.
     """
 
@@ -55,7 +56,8 @@ def exporter(*files: str) -> Callable[[Write], Write]:
             return {"masses.csv": ",".join(map(str, model.mujoco.body_mass[1:]))}
 
     Args:
-        files: paths of the files that it may write, in the folder of the model.
+        files: paths of the files that it may write, in the folder of the model; `*` stands for
+            any letters.
 
     Raises:
         DraftError: an exporter of this name exists already, or a file belongs to another one.
@@ -81,6 +83,11 @@ def exporter(*files: str) -> Callable[[Write], Write]:
 def known_files() -> set[str]:
     """Paths of all that Draft and its extensions write into the folder of a model."""
     return _paths(EXPORTERS.values())
+
+
+def is_known(path: str, known: Collection[str]) -> bool:
+    """Whether a path is one of some paths, or matches a pattern among them."""
+    return path in known or any("*" in one and fnmatchcase(path, one) for one in known)
 
 
 def _paths(exporters: Iterable[Exporter]) -> set[str]:
@@ -110,16 +117,19 @@ def contents(model: Model, name: str) -> Files:
     with EXPORTERS.calls(name, "correct it, or name other formats"):
         files = {str(path): content for path, content in EXPORTERS[name].function(model).items()}
         for path, content in files.items():
-            if path not in EXPORTERS[name].files:
+            if not is_known(path, EXPORTERS[name].files):
                 raise ValueError(f"it writes '{path}', which it does not name")
             if not isinstance(content, (str, bytes)):
                 raise TypeError(f"'{path}' is neither text nor bytes")
         return files
 
 
-@exporter("robot.urdf", "meshes/trunk.stl", "actuators.json")
+_MESHES = ("meshes/trunk.stl", "meshes/part.*.stl")
+
+
+@exporter("robot.urdf", *_MESHES, "actuators.json")
 def urdf(model: Model) -> dict[str, str | bytes]:
-    """URDF with the mesh of the trunk, and a table of what URDF cannot hold."""
+    """URDF with the meshes of trunk and parts, and a table of what URDF cannot hold."""
     from draft.model import urdf as format_
 
     table: dict[str, Any] = plain(format_.actuators(model.design))
@@ -130,9 +140,9 @@ def urdf(model: Model) -> dict[str, str | bytes]:
     }
 
 
-@exporter("robot.sdf", "model.config", "meshes/trunk.obj")
+@exporter("robot.sdf", "model.config", "meshes/trunk.obj", "meshes/part.*.obj")
 def sdf(model: Model) -> dict[str, str | bytes]:
-    """SDFormat with the mesh of the trunk, as a folder that Gazebo finds as a model."""
+    """SDFormat with the meshes of trunk and parts, as a folder that Gazebo finds as a model."""
     from draft.model.sdf import meshes, model_config, robot_sdf
 
     return {
@@ -174,7 +184,7 @@ def mjlab(model: Model) -> dict[str, str | bytes]:
     return {"mjlab_robot.py": mjlab_py(model), "robot.xml": model.xml}
 
 
-@exporter("isaaclab_robot.py", "robot.urdf", "meshes/trunk.stl")
+@exporter("isaaclab_robot.py", "robot.urdf", *_MESHES)
 def isaaclab(model: Model) -> dict[str, str | bytes]:
     """Python file that configures the robot for Isaac Lab, and its URDF."""
     from draft.model.lab import isaaclab_py

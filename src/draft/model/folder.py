@@ -18,7 +18,7 @@ from draft.design.report import design_file, report
 from draft.errors import DraftError
 from draft.extras import own_version
 from draft.files import cannot_write, new_folder
-from draft.model.exporters import check_formats, contents, known_files
+from draft.model.exporters import check_formats, contents, is_known, known_files
 from draft.values import plain, plain_value
 
 if TYPE_CHECKING:
@@ -42,9 +42,9 @@ def save(
         folder: folder to write. Everything that Draft wrote there before is removed, so that all
             files are of one design.
         formats: names of `EXPORTERS`: "mjcf" is robot.xml and scene.xml; "urdf" is robot.urdf,
-            meshes/trunk.stl and actuators.json; "sdf" is robot.sdf, model.config and
-            meshes/trunk.obj; "glb" is robot.glb; "step" is robot.step and bom.csv; "mjlab" and
-            "isaaclab" are a Python file with robot.xml, or with robot.urdf and its mesh.
+            meshes and actuators.json; "sdf" is robot.sdf, model.config and meshes; "glb" is
+            robot.glb; "step" is robot.step and bom.csv; "mjlab" and "isaaclab" are a Python file
+            with robot.xml, or with robot.urdf and its meshes.
         more: text of further files by name, all of them known.
 
     Returns:
@@ -122,7 +122,8 @@ def check_target(folder: Path, known: Set[str], what: str) -> None:
 
     Args:
         folder: the folder.
-        known: paths of all files and folders that Draft may have written there.
+        known: paths, or patterns of paths, of all files and folders that Draft may have written
+            there.
         what: what such a folder is, for messages.
 
     Raises:
@@ -134,7 +135,7 @@ def check_target(folder: Path, known: Set[str], what: str) -> None:
         if not folder.is_dir() or not any(folder.iterdir()):
             return
         found = (path.relative_to(folder).as_posix() for path in folder.rglob("*"))
-        others = sorted({*found} - known)
+        others = sorted(path for path in found if not is_known(path, known))
         if others or not (folder / "report.json").is_file():
             held = f"it holds {', '.join(others[:4])}" if others else "it has no report.json"
             cause = f"'{folder}' is not a folder of a {what} ({held}); it is kept"

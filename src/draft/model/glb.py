@@ -21,6 +21,7 @@ from draft.geometry import about, quaternion
 from draft.model.mjcf import colors
 from draft.model.shapes import Shape, shapes
 from draft.model.solids import triangles
+from draft.spec.primitives.mesh import Mesh
 from draft.values import Array, Value, scalar
 
 if TYPE_CHECKING:
@@ -70,16 +71,23 @@ def robot_glb(model: Model) -> bytes:
     body_nodes: dict[int, int] = {
         node["extras"]["body"]: k for k, node in enumerate(nodes) if "extras" in node
     }
+    parts: dict[str, Node] = {}  # Copies of a part share its vertices.
     for shape in shapes(model.mujoco, model.design):
-        solid = triangles(shape, model.design)
-        primitive = {
-            "attributes": {
-                "POSITION": buffer.vectors(solid.points),
-                "NORMAL": buffer.vectors(solid.normals),
-            },
-            "indices": buffer.indices(solid.faces),
-            "material": list(kinds).index(shape.kind),
-        }
+        if not shape.drawn:
+            continue
+        primitive = parts.get(shape.mesh.name) if isinstance(shape.mesh, Mesh) else None
+        if primitive is None:
+            solid = triangles(shape)
+            primitive = {
+                "attributes": {
+                    "POSITION": buffer.vectors(solid.points),
+                    "NORMAL": buffer.vectors(solid.normals),
+                },
+                "indices": buffer.indices(solid.faces),
+            }
+        if isinstance(shape.mesh, Mesh):
+            parts[shape.mesh.name] = primitive
+        primitive = primitive | {"material": list(kinds).index(shape.kind)}
         meshes.append({"name": shape.name, "primitives": [primitive]})
         _append(nodes, body_nodes[shape.body], _shape_node(shape) | {"mesh": len(meshes) - 1})
     scene = {

@@ -24,8 +24,9 @@ from draft.errors import DraftError
 from draft.geometry import Vector
 from draft.model.texts import Text, of_template
 from draft.model.xml import Element
-from draft.spec.primitives.base import COLORS, Color, Geom
+from draft.spec.primitives.base import COLORS, HIDDEN, HIDDEN_COLOR, Color, Geom
 from draft.spec.primitives.loft import Loft
+from draft.spec.primitives.mesh import Mesh
 from draft.spec.primitives.root import TrunkPart
 from draft.values import Array, Value, both, either, is_array, scalar, sqrt, where
 
@@ -50,7 +51,9 @@ FORMS = {"trunk": "mesh", "structure": "cylinder", "actuator": "cylinder", "draw
 def colors(design: Design) -> dict[str, Color]:
     """Colours by kind of geom of a robot; the kinds of all robots come first."""
     ends = [body.link.end for body in design.bodies if body.link.end is not None]
-    return COLORS | {kind: color for end in ends for kind, color in end.colors.items()}
+    parts = any(body.shapes for body in design.bodies)
+    kinds = COLORS | ({HIDDEN: HIDDEN_COLOR} if parts else {})
+    return kinds | {kind: color for end in ends for kind, color in end.colors.items()}
 
 
 def robot_xml(design: Design) -> str:
@@ -75,7 +78,8 @@ def robot_element(design: Design) -> Element:
     """
     reuse = plan(design.spec).reuse(design.count)
     root, trunk = design.spec.root, design.lofted
-    if root is None or trunk is None:
+    # A trunk of one's own has whatever holds its parts.
+    if root is None or trunk is None or trunk.shape is not None:
         return _robot(design, ())
     held = [
         reuse.result(("bracket", i), _bracket, design.bodies[i], suffix, trunk.loft, root.axis)
@@ -132,8 +136,12 @@ def _robot(design: Design, brackets: Sequence[Element]) -> Element:
     root = Element("mujoco", model=design.name)
     root.add("compiler", angle="radian", autolimits="true")
     root.children.append(reuse.result("defaults", lambda: _defaults(design)))
-    if trunk is not None:
-        root.add("asset").children.append(reuse.result("mesh", _trunk_mesh, name, trunk.loft))
+    meshes = [*_part_meshes(design)]
+    if trunk is not None or meshes:
+        asset = root.add("asset")
+        if trunk is not None:
+            asset.children.append(reuse.result("mesh", _trunk_mesh, name, trunk.loft))
+        asset.children += meshes
     world = root.add("worldbody")
     elements: list[Element] = []
     # Names are unique: a geom is named after its body, with a suffix that is unique to its kind.
@@ -162,13 +170,16 @@ def _base(body: Body, trunk: TrunkPart | None, height: Value) -> Element:
         return _placed(body)
     element = Element("body", name=body.name, pos=(0, 0, height))
     element.add("freejoint", name=FLOATING)
-    element.add(
-        "geom",
-        name=body.name + trunk.suffix,
-        class_="trunk",
-        mesh=body.name,
-        density=trunk.density,
-    )
+    if trunk.shape is None:
+        element.add(
+            "geom",
+            name=body.name + trunk.suffix,
+            class_="trunk",
+            mesh=body.name,
+            density=trunk.density,
+        )
+    else:
+        element.children += [_geom(body.name, geom) for geom in trunk.geoms()]
     element.add("site", name=trunk.site)
     return element
 
@@ -209,7 +220,7 @@ def _defaults(design: Design) -> Element:
         kind.add(
             "geom",
             type=FORMS.get(name),
-            group=2,
+            group=3 if name == HIDDEN else 2,
             contype=0,
             conaffinity=touches,
             rgba=color,
@@ -228,6 +239,14 @@ def _trunk_mesh(name: str, loft: Loft) -> Element:
         vertices = tuple(points.reshape(-1, points.shape[2]))
         faces = loft.faces().ravel().tolist() if loft.convex else ()
     return Element("mesh", name=name, inertia="exact", vertex=vertices, face=faces)
+
+
+def _part_meshes(design: Design) -> Iterator[Element]:
+    """Elements of the meshes of parts, each once. They weigh nothing: boxes have their inertia."""
+    parts = {part.mesh.name: part.mesh for body in design.bodies for _, part in body.shapes}
+    for name, mesh in parts.items():
+        vertices, faces = mesh.vertex_text, mesh.face_text
+        yield Element("mesh", name=name, inertia="shell", vertex=vertices, face=faces)
 
 
 def _body(body: Body, actuator: Actuator | None) -> Element:
@@ -269,20 +288,22 @@ def _parts(body: Body) -> Iterator[Element]:
 
 def _geom(body: str, geom: Geom) -> Element:
     """Geom with the density that gives its mass; a geom without mass has none."""
-    form, size, quat = geom.form, geom.size, None
+    form, size, quat, mesh = geom.form, geom.size, None, geom.mesh
     if form == "cylinder":
         size, quat = (size[0], size[1] / 2), _toward(geom.axis)
     elif form == "box":
         size = tuple(side / 2 for side in size)
-        quat = None if geom.rotation is None else g.quaternion(geom.rotation)
+    if geom.rotation is not None:
+        quat = g.quaternion(geom.rotation)
     return Element(
         "geom",
         name=body + geom.suffix,
         class_=geom.kind,
         type=None if FORMS.get(geom.kind) == form else form,
+        mesh=None if mesh is None else mesh.name if isinstance(mesh, Mesh) else body,
         pos=geom.center,
         quat=quat,
-        size=size,
+        size=size or None,
         density=None if geom.mass is None else geom.mass / geom.volume,
         mass=0 if geom.mass is None and geom.kind != "drawn" else None,
         conaffinity=None if geom.collides or geom.kind == "drawn" else 0,

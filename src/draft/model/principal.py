@@ -59,6 +59,19 @@ def apply(matrix: Array, v: Array) -> Array:
     return np.einsum("...ijn,...jn->...in", matrix, v)
 
 
+def composed(a: Array, b: Array) -> Array:
+    """Products of unit quaternions, shape (4, N): the turn of b, then that of a."""
+    (w, x, y, z), (s, i, j, k) = a, b
+    return np.stack(
+        [
+            w * s - x * i - y * j - z * k,
+            w * i + x * s + y * k - z * j,
+            w * j - x * k + y * s + z * i,
+            w * k + x * j - y * i + z * s,
+        ]
+    )
+
+
 def off_centre(mass: Array, arm: Array) -> Array:
     """Inertia tensors of points of a mass, shape (..., N), at arms, shape (..., 3, N)."""
     square = (arm * arm).sum(axis=-2)[..., None, None, :] * np.eye(3)[..., None]

@@ -15,28 +15,30 @@ import mujoco
 
 from draft.design.design import Body, Design
 from draft.model.mjcf import colors
-from draft.model.shapes import Shape, matrix, shapes
+from draft.model.shapes import Shape, matrix, mesh_geoms, shapes
 from draft.model.urdf import (
     DECLARATION,
     LEAST_MASS,
     distinct_name,
     joint_name,
+    mesh_file,
     rpy,
     tensor,
 )
 from draft.model.xml import Element
 from draft.spec.primitives.base import Color
+from draft.spec.primitives.loft import Loft
+from draft.spec.primitives.mesh import Mesh
 from draft.values import scalar
 
 if TYPE_CHECKING:
     from draft.model.model import Model
 
 VERSION = "1.11"  # The first with `mimic`.
-TRUNK = "meshes/trunk.obj"  # Drake finds contacts with OBJ, and refuses STL.
 
 
 def robot_sdf(model: Model) -> str:
-    """SDFormat text of the robot; it refers to the mesh `TRUNK` in the same folder."""
+    """SDFormat text of the robot; it refers to the meshes of `meshes` in the same folder."""
     design, compiled = model.design, model.mujoco
     root = Element("sdf", version=VERSION, **{"xmlns:drake": "http://drake.mit.edu"})
     robot = root.add("model", name=design.name, canonical_link=design.bodies[0].name)
@@ -64,14 +66,22 @@ def model_config(model: Model) -> str:
 
 
 def meshes(design: Design) -> dict[str, str]:
-    """Text of the mesh of the trunk (Wavefront OBJ, [m]) by its path; a fixed base has none."""
-    if design.lofted is None:
-        return {}
-    loft = design.lofted.loft
-    points = (" ".join(f"{x:.10g}" for x in point) for point in loft.vertices.tolist())
-    faces = (" ".join(map(str, face)) for face in (loft.faces() + 1).tolist())
-    lines = [*(f"v {point}" for point in points), *(f"f {face}" for face in faces)]
-    return {TRUNK: "\n".join(lines) + "\n"}
+    """Texts of the meshes of trunk and parts (Wavefront OBJ, [m]) by their paths.
+
+    Drake finds contacts with OBJ, and refuses STL.
+    """
+    found = (geom.mesh for geom in mesh_geoms(design).values())
+    return {_path(mesh): _obj(mesh) for mesh in found if mesh is not None}
+
+
+def _path(mesh: Loft | Mesh) -> str:
+    return mesh_file(mesh).removesuffix(".stl") + ".obj"
+
+
+def _obj(mesh: Loft | Mesh) -> str:
+    points = (" ".join(f"{x:.10g}" for x in point) for point in mesh.vertices.tolist())
+    faces = (" ".join(map(str, face)) for face in (mesh.faces() + 1).tolist())
+    return "\n".join([*(f"v {point}" for point in points), *(f"f {face}" for face in faces)]) + "\n"
 
 
 def _link(
@@ -93,10 +103,11 @@ def _link(
     for name, value in tensor(compiled, i).items():
         inertia.put(name, value)
     for shape in drawn:
-        visual = _shape(link, "visual", shape, shape.name)
-        material = visual.add("material")
-        material.put("ambient", paint[shape.kind])
-        material.put("diffuse", paint[shape.kind])
+        if shape.drawn:
+            visual = _shape(link, "visual", shape, shape.name)
+            material = visual.add("material")
+            material.put("ambient", paint[shape.kind])
+            material.put("diffuse", paint[shape.kind])
         if shape.collides:
             _shape(link, "collision", shape, f"{shape.name}_collision")
 
@@ -105,8 +116,8 @@ def _shape(link: Element, use: str, shape: Shape, name: str) -> Element:
     element = link.add(use, name=name)
     element.put("pose", (*shape.position, *rpy(shape.rotation)))
     geometry = element.add("geometry").add(shape.form)
-    if shape.form == "mesh":
-        geometry.put("uri", TRUNK)
+    if shape.mesh is not None:
+        geometry.put("uri", _path(shape.mesh))
     elif shape.form == "box":
         geometry.put("size", 2 * shape.size)
     else:

@@ -105,9 +105,9 @@ def surface(corners: Array, area: float) -> Array:
 
 
 def triangles(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """Corners of triangles on the surfaces of all geoms except planes [m], shape (n, 3, 3)."""
+    """Corners of triangles on the surfaces of all that is drawn except planes [m], (n, 3, 3)."""
     found = [np.empty((0, 3, 3))]
-    for i in range(model.ngeom):
+    for i in np.flatnonzero(model.geom_rgba[:, 3]).tolist():
         own = _solid(model, i)
         if own is not None:
             found.append(own @ data.geom_xmat[i].reshape(3, 3).T + data.geom_xpos[i])

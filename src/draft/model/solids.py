@@ -1,4 +1,4 @@
-"""Triangles of shapes: boxes, cylinders and spheres around the origin, and the trunk.
+"""Triangles of shapes: boxes, cylinders and spheres around the origin, and meshes.
 
 Vertices are duplicated at edges, so that a cylinder is shaded smoothly and its caps are flat.
 """
@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.design import Design
 from draft.model.shapes import Shape
 from draft.values import Array
 
@@ -34,17 +33,15 @@ class Triangles(NamedTuple):
     faces: NDArray[np.int64]
 
 
-def triangles(shape: Shape, design: Design, segments: int = SEGMENTS) -> Triangles:
+def triangles(shape: Shape, segments: int = SEGMENTS) -> Triangles:
     """Triangles of a shape in its own frame [m].
 
     Args:
         shape: the shape.
-        design: the design that it belongs to, with the trunk of a shape of form "mesh".
         segments: vertices around a round shape.
     """
-    if shape.form == "mesh":
-        loft = design.trunk.loft
-        return _flat(loft.vertices[loft.faces()])
+    if shape.mesh is not None:
+        return _flat(shape.mesh.vertices[shape.mesh.faces()])
     size = shape.size
     if shape.form == "box":
         return _scaled(_box(), size)

@@ -2,7 +2,8 @@
 
 Every link and every actuator is a part, with the name, the solids and the colours that Draft draws.
 A part has the frame of its link; that of an actuator is in its middle, with z along the shaft. The
-trunk is the faceted solid that is weighed, with coplanar triangles as one face. STEP has no joints:
+trunk is the faceted solid that is weighed, with coplanar triangles as one face. A part of one's own
+is the solid of its STEP file, or of its triangles. STEP has no joints:
 an axis is a line in a part of its own, as CAD programs exchange construction geometry, from a point
 on the axis in its positive direction. Mean densities are material properties.
 
@@ -21,31 +22,29 @@ import numpy as np
 from draft import geometry as g
 from draft.design.design import Body, Design
 from draft.errors import ModelError
-from draft.extras import need, own_version
+from draft.extras import own_version
 from draft.geometry import Frame, Vector
 from draft.spec.primitives import colors
 from draft.spec.primitives.base import Geom
 from draft.spec.primitives.loft import Loft
-from draft.values import Value, scalar
+from draft.spec.primitives.mesh import Mesh
+from draft.spec.step_file import kernel, solids
+from draft.values import Array, Value, scalar
 
 if TYPE_CHECKING:
     from draft.model.model import Model
 
 
-def _kernel(module: str) -> Any:
-    """Module of the kernel, which carries no types."""
-    return need(f"OCP.{module}", "cad")
-
-
 # The exporter imports this module when it writes, so a missing kernel is an error of the export.
-_gp, _make, _text = _kernel("gp"), _kernel("BRepBuilderAPI"), _kernel("TCollection")
-_prim, _topology, _xcaf = _kernel("BRepPrimAPI"), _kernel("TopoDS"), _kernel("XCAFDoc")
+_gp, _make, _text = kernel("gp"), kernel("BRepBuilderAPI"), kernel("TCollection")
+_prim, _topology, _xcaf = kernel("BRepPrimAPI"), kernel("TopoDS"), kernel("XCAFDoc")
 
 _MM = 1000.0  # per metre
 _SEWN = 1e-6  # Distance of edges that are one [mm].
 _SAME = 1e-6  # Relative difference of volumes, as of masses in MuJoCo.
 _AXIS = 0.1  # Length of an axis, as a share of the diagonal of the box around the robot.
 _AXIS_KIND = "drawn"
+_MOST = 10_000  # Triangles of a part, which the kernel sews in about 20 s.
 
 
 def robot_step(model: Model) -> bytes:
@@ -64,7 +63,10 @@ def robot_step(model: Model) -> bytes:
         if (motor := _motor(body)) is not None:
             geom, within = motor
             name, place = f"{body.name}{geom.suffix}", _placement(_inside(frame, within))
-            assembly.add(name, place, [(_solid(geom), geom.kind)], geom.mass or 0.0, geom.volume)
+            part = body.actuator.shape if body.actuator is not None else None
+            volume = geom.volume if part is None else part.mesh.volume
+            solid = _solid(geom) if part is None else _own(part.mesh)
+            assembly.add(name, place, [(solid, geom.kind)], geom.mass or 0.0, volume)
             shafts[name] = place
         if body.link.pulley is not None:
             geom = body.link.pulley.geom(body.link.tip)
@@ -87,17 +89,19 @@ def _inside(outer: Frame, inner: Frame) -> Frame:
 
 def _add_link(assembly: _Assembly, design: Design, body: Body, frame: Frame) -> None:
     """Add the solids of a link as one part; a link without any, as of a housing, has none."""
-    solids: list[tuple[Any, str]] = []
+    found: list[tuple[Any, str]] = []
     mass: Value = 0.0
     volume: Value = 0.0
     if body.parent is None and (trunk := design.lofted) is not None:
-        solids.append((_lofted(trunk.loft), "trunk"))
-        mass, volume = trunk.mass, trunk.loft.volume
-    for geom in body.link_solids():
-        solids.append((_solid(geom), geom.kind))
-        mass, volume = mass + (geom.mass or 0.0), volume + geom.volume
-    if solids:
-        assembly.add(body.name, _placement(frame), solids, mass, volume)
+        own = None if trunk.shape is None else trunk.shape.mesh
+        found.append((_lofted(trunk.loft) if own is None else _own(own), "trunk"))
+        mass, volume = trunk.mass, (own or trunk.loft).volume
+    for geom, part in body.replaced():
+        found.append((_solid(geom) if part is None else _own(part.mesh), geom.kind))
+        mass = mass + (geom.mass or 0.0)
+        volume = volume + (geom.volume if part is None else part.mesh.volume)
+    if found:
+        assembly.add(body.name, _placement(frame), found, mass, volume)
 
 
 def _motor(body: Body) -> tuple[Geom, Frame] | None:
@@ -105,11 +109,10 @@ def _motor(body: Body) -> tuple[Geom, Frame] | None:
     motor = body.link.motor
     if motor is None:
         return None
-    turn = g.transposed((motor.long, g.cross(motor.axis, motor.long), motor.axis))
     x, _, z = g.IDENTITY
     upright = body.link._replace(motor=motor._replace(center=g.ZERO, axis=z, long=x))
     geom = body._replace(link=upright).motor_geom
-    return None if geom is None else (geom, (motor.center, turn))
+    return None if geom is None else (geom, motor.frame)
 
 
 def _point(at: Vector) -> Any:
@@ -148,8 +151,50 @@ def _lofted(loft: Loft) -> Any:
     """
     k = loft.corners
     sides = loft.faces()[: 2 * k * (loft.sections - 1)]
+    faces = [loft.vertices[:k], *loft.vertices[sides], loft.vertices[-k:]]
+    remedy = "correct the sections in root.yaml: none may touch itself"
+    return _sewn(faces, loft.volume, "the trunk", remedy)
+
+
+def _own(mesh: Mesh) -> Any:
+    """Solid of a part of one's own.
+
+    Raises:
+        ModelError: the solid is not that of the design, as of a surface that cuts itself, or the
+            mesh has too many triangles.
+    """
+    if mesh.step is None:
+        if len(mesh.corners) > _MOST:
+            raise ModelError(
+                f"'{mesh.file}' has {len(mesh.corners)} triangles, and its solid at most {_MOST}",
+                "export the part as STEP, or coarser",
+            )
+        remedy = "mend it in the program that made it, or export it as STEP"
+        faces = [*mesh.vertices[mesh.faces()]]
+        return _sewn(faces, mesh.volume, f"'{mesh.file}'", remedy)
+    shape = solids(mesh.step)
+    for axis, sign in zip(g.IDENTITY, mesh.signs, strict=True):
+        if sign < 0:
+            mirror = _gp.gp_Trsf()
+            mirror.SetMirror(_gp.gp_Ax2(_point(g.ZERO), _direction(axis)))
+            shape = _make.BRepBuilderAPI_Transform(shape, mirror, True).Shape()
+    return shape
+
+
+def _sewn(faces: Sequence[Array], expected: Value, what: str, remedy: str) -> Any:
+    """Solid of polygons, whose coplanar ones become one face.
+
+    Args:
+        faces: corners of each [m], shape (n, 3).
+        expected: volume that it must have [m3].
+        what: what it is, for messages.
+        remedy: what to do about one that is no solid.
+
+    Raises:
+        ModelError: it is none, or has another volume.
+    """
     sewing = _make.BRepBuilderAPI_Sewing(_SEWN)
-    for corners in (loft.vertices[:k], *loft.vertices[sides], loft.vertices[-k:]):
+    for corners in faces:
         places = corners * _MM
         # Corners coincide where a plain rectangle is between chamfered ones.
         places = places[np.linalg.norm(places - np.roll(places, 1, axis=0), axis=1) > _SEWN]
@@ -162,21 +207,20 @@ def _lofted(loft: Loft) -> Any:
         sewing.Add(_make.BRepBuilderAPI_MakeFace(wire.Wire(), True).Face())
     sewing.Perform()
     volume, sewed = 0.0, sewing.SewedShape()
-    if sewed.ShapeType() == _kernel("TopAbs").TopAbs_ShapeEnum.TopAbs_SHELL:
+    if sewed.ShapeType() == kernel("TopAbs").TopAbs_ShapeEnum.TopAbs_SHELL:
         solid = _make.BRepBuilderAPI_MakeSolid(_topology.TopoDS.Shell(sewed)).Solid()
-        _kernel("BRepLib").BRepLib.OrientClosedSolid_s(solid)
-        merged = _kernel("ShapeUpgrade").ShapeUpgrade_UnifySameDomain(solid, True, True, False)
+        kernel("BRepLib").BRepLib.OrientClosedSolid_s(solid)
+        merged = kernel("ShapeUpgrade").ShapeUpgrade_UnifySameDomain(solid, True, True, False)
         merged.Build()
-        properties = _kernel("GProp").GProp_GProps()
-        _kernel("BRepGProp").BRepGProp.VolumeProperties_s(merged.Shape(), properties)
+        properties = kernel("GProp").GProp_GProps()
+        kernel("BRepGProp").BRepGProp.VolumeProperties_s(merged.Shape(), properties)
         volume = properties.Mass() / _MM**3
-        valid = _kernel("BRepCheck").BRepCheck_Analyzer(merged.Shape()).IsValid()
-        if valid and abs(volume - loft.volume) <= _SAME * loft.volume:
+        valid = kernel("BRepCheck").BRepCheck_Analyzer(merged.Shape()).IsValid()
+        if valid and abs(volume - expected) <= _SAME * expected:
             return merged.Shape()
     raise ModelError(
-        f"the trunk of {loft.volume:.9g} m3 is no solid for the CAD kernel, which finds "
-        f"{volume:.9g} m3",
-        "correct the sections in root.yaml: none may touch itself",
+        f"{what} of {expected:.9g} m3 is no solid for the CAD kernel, which finds {volume:.9g} m3",
+        remedy,
     )
 
 
@@ -188,7 +232,7 @@ class _Assembly:
     """
 
     def __init__(self, name: str) -> None:
-        self._document = _kernel("TDocStd").TDocStd_Document(_extended("BinXCAF"))
+        self._document = kernel("TDocStd").TDocStd_Document(_extended("BinXCAF"))
         tool, main = _xcaf.XCAFDoc_DocumentTool, self._document.Main()
         tool.SetLengthUnit_s(self._document, 1 / _MM)
         self._shapes, self._colors = tool.ShapeTool_s(main), tool.ColorTool_s(main)
@@ -216,7 +260,7 @@ class _Assembly:
         shape = solids[0][0]
         if len(solids) > 1:
             shape = _topology.TopoDS_Compound()
-            builder = _kernel("BRep").BRep_Builder()
+            builder = kernel("BRep").BRep_Builder()
             builder.MakeCompound(shape)
             for solid, _ in solids:
                 builder.Add(shape, solid)
@@ -251,8 +295,8 @@ class _Assembly:
     def diagonal(self) -> float:
         """Diagonal of the box around the assembly [mm]."""
         self._shapes.UpdateAssemblies()
-        box = _kernel("Bnd").Bnd_Box()
-        _kernel("BRepBndLib").BRepBndLib.Add_s(self._shapes.GetShape_s(self._root), box)
+        box = kernel("Bnd").Bnd_Box()
+        kernel("BRepBndLib").BRepBndLib.Add_s(self._shapes.GetShape_s(self._root), box)
         return 0.0 if box.IsVoid() else float(np.sqrt(box.SquareExtent()))
 
     def written(self, title: str) -> bytes:
@@ -263,24 +307,24 @@ class _Assembly:
         """
         self._shapes.UpdateAssemblies()
         # It prints statistics on stdout, where commands print JSON.
-        message = _kernel("Message")
+        message = kernel("Message")
         for printer in message.Message.DefaultMessenger_s().Printers():
             printer.SetTraceLevel(message.Message_Gravity.Message_Fail)
-        writer = _kernel("STEPCAFControl").STEPCAFControl_Writer()
+        writer = kernel("STEPCAFControl").STEPCAFControl_Writer()
         writer.SetMaterialMode(True)
-        as_is = _kernel("STEPControl").STEPControl_StepModelType.STEPControl_AsIs
+        as_is = kernel("STEPControl").STEPControl_StepModelType.STEPControl_AsIs
         stream, status = io.BytesIO(), None
         if writer.Transfer(self._document, as_is):
             steps = writer.Writer().Model()
             _correct_densities(steps)
-            header = _kernel("APIHeaderSection").APIHeaderSection_MakeHeader(steps)
+            header = kernel("APIHeaderSection").APIHeaderSection_MakeHeader(steps)
             header.SetName(_ascii(title))
             header.SetOriginatingSystem(_ascii(f"Draft {own_version()}"))
             # Of the kernel, otherwise.
             header.SetAuthorValue(1, _ascii(""))
             header.SetOrganizationValue(1, _ascii(""))
             status = writer.WriteStream(stream)
-        if status != _kernel("IFSelect").IFSelect_ReturnStatus.IFSelect_RetDone:
+        if status != kernel("IFSelect").IFSelect_ReturnStatus.IFSelect_RetDone:
             raise ModelError(
                 f"the CAD kernel cannot write STEP: {status or 'nothing is transferred'}",
                 "this is a bug in Draft: report it with the spec",
@@ -294,7 +338,7 @@ class _Assembly:
         return part
 
     def _color(self, label: Any, kind: str) -> None:
-        quantity = _kernel("Quantity")
+        quantity = kernel("Quantity")
         srgb = quantity.Quantity_TypeOfColor.Quantity_TOC_sRGB
         color = quantity.Quantity_Color(*colors()[kind][:3], srgb)
         self._colors.SetColor(label, color, _xcaf.XCAFDoc_ColorType.XCAFDoc_ColorGen)
@@ -304,7 +348,7 @@ def _location(place: Any) -> Any:
     """Location of the kernel at some axes."""
     move = _gp.gp_Trsf()
     move.SetTransformation(place, _gp.gp_Ax3())
-    return _kernel("TopLoc").TopLoc_Location(move)
+    return kernel("TopLoc").TopLoc_Location(move)
 
 
 def _extended(text: str) -> Any:
@@ -316,7 +360,7 @@ def _ascii(text: str) -> Any:
 
 
 def _named(label: Any, name: str) -> Any:
-    _kernel("TDataStd").TDataStd_Name.Set_s(label, _extended(name))
+    kernel("TDataStd").TDataStd_Name.Set_s(label, _extended(name))
     return label
 
 
@@ -326,7 +370,7 @@ def _correct_densities(steps: Any) -> None:
     Args:
         steps: the entities of the file.
     """
-    basic = _kernel("StepBasic")
+    basic = kernel("StepBasic")
     for i in range(1, steps.NbEntities() + 1):
         entity = steps.Value(i)
         if isinstance(entity, basic.StepBasic_DerivedUnitElement):

@@ -18,9 +18,11 @@ import numpy as np
 from draft.design.design import Body, Design
 from draft.model.mjcf import colors
 from draft.model.scene import DAMPING, STIFFNESS
-from draft.model.shapes import Shape, matrix, shapes
+from draft.model.shapes import Shape, matrix, mesh_geoms, shapes
 from draft.model.xml import Element
+from draft.spec.primitives.base import HIDDEN
 from draft.spec.primitives.loft import Loft
+from draft.spec.primitives.mesh import Mesh
 from draft.values import Array, scalar
 
 if TYPE_CHECKING:
@@ -48,8 +50,8 @@ _CORNERED = (
 
 
 def robot_urdf(model: Model) -> str:
-    """URDF text of the robot; it refers to the mesh `meshes/trunk.stl` in the same folder."""
-    root = robot_element(model, TRUNK)
+    """URDF text of the robot; it refers to the meshes of `meshes` in the same folder."""
+    root = robot_element(model)
     root.add("mujoco").add(
         "compiler",
         strippath="false",
@@ -60,24 +62,25 @@ def robot_urdf(model: Model) -> str:
     return DECLARATION + root.text()
 
 
-def robot_element(model: Model, mesh: str, gazebo: bool = False) -> Element:
+def robot_element(model: Model, prefix: str = "", gazebo: bool = False) -> Element:
     """URDF of the robot as elements.
 
     Args:
         model: the model.
-        mesh: file of the trunk's mesh as URDF names it.
+        prefix: what stands before the paths of meshes.
         gazebo: whether it is for Gazebo, which needs a mass of every link, and names of joints that
             differ from those of links.
     """
     root = Element("robot", name=model.design.name)
     for name, color in colors(model.design).items():
-        root.add("material", name=name).add("color", rgba=color)
+        if name != HIDDEN:
+            root.add("material", name=name).add("color", rgba=color)
     if not model.design.floating:
         root.add("link", name="world")
     drawn = shapes(model.mujoco, model.design)
     for i, body in enumerate(model.design.bodies):
         own = [shape for shape in drawn if shape.body == i + 1]
-        _link(root, model.mujoco, i + 1, own, mesh, gazebo)
+        _link(root, model.mujoco, i + 1, own, prefix, gazebo)
         if body.parent is not None or not model.design.floating:
             _joint(root, model, body, i + 1, gazebo)
     return root
@@ -124,20 +127,27 @@ def actuators(design: Design) -> dict[str, Any]:
 
 
 def meshes(design: Design) -> dict[str, bytes]:
-    """Bytes of the mesh of the trunk by its path; a fixed base has none."""
-    return {} if design.lofted is None else {TRUNK: trunk_stl(design.lofted.loft)}
+    """Bytes of the meshes of the trunk and of parts by their paths."""
+    found = (geom.mesh for geom in mesh_geoms(design).values())
+    return {mesh_file(mesh): stl(mesh) for mesh in found if mesh is not None}
 
 
-def trunk_stl(loft: Loft) -> bytes:
-    """Bytes of a binary STL file of the trunk in its own frame [m]."""
-    corners = loft.vertices[loft.faces()]
+def mesh_file(mesh: Loft | Mesh) -> str:
+    """Path of a mesh in the folder of a model."""
+    return f"meshes/{mesh.name}.stl" if isinstance(mesh, Mesh) else TRUNK
+
+
+def stl(mesh: Loft | Mesh) -> bytes:
+    """Bytes of a binary STL file of a mesh in its own frame [m]."""
+    corners = mesh.vertices[mesh.faces()]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     record = np.zeros(len(corners), dtype=[("numbers", "<f4", (4, 3)), ("attribute", "<u2")])
     record["numbers"][:, 0] = normals / np.maximum(lengths, np.finfo(float).tiny)
     record["numbers"][:, 1:] = corners
     # A header that begins with "solid" marks the text format.
-    heading = b"binary STL of a trunk, in metres".ljust(80)
+    what = f"of {mesh.name}" if isinstance(mesh, Mesh) else "of a trunk"
+    heading = f"binary STL {what[:48]}, in metres".encode().ljust(80)
     return heading + len(corners).to_bytes(4, "little") + record.tobytes()
 
 
@@ -167,7 +177,7 @@ def tensor(model: mujoco.MjModel, i: int) -> dict[str, float]:
 
 
 def _link(
-    root: Element, model: mujoco.MjModel, i: int, drawn: list[Shape], mesh: str, least: bool
+    root: Element, model: mujoco.MjModel, i: int, drawn: list[Shape], prefix: str, least: bool
 ) -> None:
     link = root.add("link", name=model.body(i).name)
     mass = float(model.body_mass[i]) or (LEAST_MASS if least else 0.0)
@@ -177,19 +187,20 @@ def _link(
         inertial.add("mass", value=mass)
         inertial.add("inertia", **tensor(model, i))
     for shape in drawn:
-        visual = _shape(link, "visual", shape, shape.name, mesh)
-        visual.add("material", name=shape.kind)
+        if shape.drawn:
+            visual = _shape(link, "visual", shape, shape.name, prefix)
+            visual.add("material", name=shape.kind)
         if shape.collides:
-            _shape(link, "collision", shape, f"{shape.name}_collision", mesh)
+            _shape(link, "collision", shape, f"{shape.name}_collision", prefix)
 
 
-def _shape(link: Element, use: str, shape: Shape, name: str, mesh: str) -> Element:
+def _shape(link: Element, use: str, shape: Shape, name: str, prefix: str) -> Element:
     element = link.add(use, name=name)
     element.add("origin", xyz=shape.position, rpy=rpy(shape.rotation))
     geometry = element.add("geometry")
     size = shape.size
-    if shape.form == "mesh":
-        geometry.add("mesh", filename=mesh)
+    if shape.mesh is not None:
+        geometry.add("mesh", filename=prefix + mesh_file(shape.mesh))
     elif shape.form == "box":
         geometry.add("box", size=2 * size)
     elif shape.form == "sphere":

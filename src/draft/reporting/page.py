@@ -196,7 +196,9 @@ def _comparison(
 
 def _masses(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
     plot = _plot("masses", plots.masses(subjects), figures, "Mass of each design by part.")
-    return _section("mass", "Mass", plot, tables.masses(subjects))
+    own = tables.own_parts(subjects)
+    parts = "" if own is None else f"<h3>Parts of your own</h3>{own}"
+    return _section("mass", "Mass", plot, tables.masses(subjects), parts)
 
 
 def _actuators(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:

@@ -122,6 +122,7 @@ def overview(subjects: Sequence[Subject]) -> Html:
         ("structure", "kg", [number(record["structure_mass_kg"]) for record in records]),
         ("actuators", "kg", [number(record["actuator_mass_kg"]) for record in records]),
         *_carried(records),
+        *_origins(records),
         ("actuators' share", "%", [number(x) for x in share]),
         ("driven joints", "1", [str(count) for count in driven]),
         ("thigh and shank", "m", [number(subject.design.leg_length) for subject in subjects]),
@@ -135,6 +136,37 @@ def _carried(records: Sequence[Mapping[str, Any]]) -> list[Row]:
     """Row of the carried masses, if any robot carries a part."""
     masses = [record["carried_mass_kg"] for record in records]
     return [("carried", "kg", [number(mass) for mass in masses])] if any(masses) else []
+
+
+def _origins(records: Sequence[Mapping[str, Any]]) -> list[Row]:
+    """Rows of the masses by origin, if any robot has parts of its own."""
+    if not any(record["own_parts"] for record in records):
+        return []
+    each = [record["mass_by_origin_kg"] for record in records]
+    return [
+        (f"mass {what}", "kg", [number(one[origin]) for one in each])
+        for origin, what in _ORIGINS.items()
+    ]
+
+
+def own_parts(subjects: Sequence[Subject]) -> Html | None:
+    """Table of the parts in place of drawn solids; None without any."""
+    head = ["design", "file", "in place of", "copies", *map(Html, _OF_PARTS)]
+    rows: list[Sequence[str]] = []
+    for subject in subjects:
+        for one in subject.record["own_parts"]:
+            origin = _ORIGINS.get(one["origin"], one["origin"])
+            numbers = (one["mass_kg"], one["density_kg_m3"], 1e6 * one["volume_m3"])
+            words = (one["file"], one["in_place_of"], str(len(one["bodies"])))
+            rows.append([titled(subject), *words, *map(number, numbers), f"mass {origin}"])
+    return table(head, rows, "words") if rows else None
+
+
+_ORIGINS = {"stated": "stated", "trend": "predicted by laws", "catalogue": "of the catalogue"}
+_OF_PARTS = (
+    *("mass<small>kg</small>", "density<small>kg/m3</small>", "volume<small>cm3</small>"),
+    "",
+)
 
 
 def _size(subject: Subject) -> Sequence[float]:

@@ -324,7 +324,7 @@ def _structure_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
                 "add 'link: {axis: ..., length: ..., segment: ...}' to it, or fix it to a link "
                 "with one",
             )
-        elif member is not None and not stated:
+        elif member is not None and not link.states_mass:
             yield Problem(
                 f"link '{link.name}' has neither a segment class nor a mass",
                 member.places["segment"],

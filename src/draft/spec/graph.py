@@ -42,7 +42,9 @@ def order(
                     stated.pop(key.removeprefix(prefix), None)
                 else:
                     stated[key.removeprefix(prefix)] = expression
-        needs[f"{name}."] = [n for e in stated.values() for n in _nodes(e.names)]
+        part = actuator.shape.optional("density") if actuator.shape else None
+        read = [*stated.values(), *([part] if part else [])]
+        needs[f"{name}."] = [n for e in read for n in _nodes(e.names)]
     try:
         return list(graphlib.TopologicalSorter(needs).static_order())
     except graphlib.CycleError as error:

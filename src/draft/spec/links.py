@@ -13,6 +13,7 @@ from draft.spec.field_types import Model
 from draft.spec.primitives.base import End, Written, compile_part, read_axis
 from draft.spec.primitives.basic import CoupledJoint, LinkBase, Member, Motor, Pulley
 from draft.spec.primitives.basic import Joint as JointFields
+from draft.spec.primitives.shape import LinkShape
 from draft.spec.primitives.wheel import WheelJoint
 from draft.spec.reader import Path_, Source
 
@@ -69,6 +70,7 @@ class Link:
     Attributes:
         end_type: class of the primitive at its end; None without one.
         end: that primitive as written.
+        shape: part in place of its member, or of the trunk, as written.
     """
 
     name: str
@@ -79,6 +81,13 @@ class Link:
     end_type: type[End] | None
     end: Written[Model] | None
     where: Location
+    shape: Written[LinkShape] | None = None
+
+    @property
+    def states_mass(self) -> bool:
+        """Whether the mass of its member is stated."""
+        of_part = self.shape is not None and self.shape.fields.weighs
+        return of_part or (self.member is not None and "mass" in self.member.numbers)
 
     @property
     def structural(self) -> bool:
@@ -102,7 +111,7 @@ def read_link(node: LinkBase, path: Path_, source: Source) -> Link:
     Raises:
         SpecError: an actuator class is to drive a slide, or a joint without one has a transmission.
     """
-    joint = member = motor = pulley = end = None
+    joint = member = motor = pulley = end = shape = None
     if node.joint is not None:
         joint = _joint(node.joint, (*path, "joint"), source)
     if node.link is not None:
@@ -111,10 +120,12 @@ def read_link(node: LinkBase, path: Path_, source: Source) -> Link:
         motor = compile_part(node.motor, (*path, "motor"), source)
     if node.pulley is not None:
         pulley = compile_part(node.pulley, (*path, "pulley"), source)
+    if node.shape is not None:
+        shape = compile_part(node.shape, (*path, "shape"), source)
     if node.end is not None:
         end = compile_part(getattr(node, node.end.key), (*path, node.end.key), source)
     where = source.at((*path, "name"))
-    return Link(node.name, joint, member, motor, pulley, node.end, end, where)
+    return Link(node.name, joint, member, motor, pulley, node.end, end, where, shape)
 
 
 def _joint(joint: JointFields | CoupledJoint | WheelJoint, path: Path_, source: Source) -> Joint:

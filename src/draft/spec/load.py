@@ -20,7 +20,10 @@ from draft.spec import schema
 from draft.spec.check import check_spec, design_problems
 from draft.spec.expressions import Expression, parse
 from draft.spec.field_types import NAME_PATTERN, Model
-from draft.spec.primitives.root import RootFile, Trunk, read_root
+from draft.spec.links import Link
+from draft.spec.part_files import read_parts
+from draft.spec.primitives.base import compile_part
+from draft.spec.primitives.root import RootFile, Trunk, WrittenRoot, read_root
 from draft.spec.problems import NAME_RULE, first_few, translate
 from draft.spec.reader import Source, read_file, read_mapping, read_text
 from draft.spec.schema import STATED, asks_for_trend
@@ -197,18 +200,22 @@ def _spec(
     further = [name for name in (trends, structure) if name.endswith(".json")]
     further += [parameters_file.catalogue] if parameters_file.catalogue else []
     files = {name: file(name) for name in (*names, *further)}
+    actuators = _actuators(parameters_file, parameters_source)
+    bodies = expand(tree_file, tree_source)
+    parts, meshes = read_parts(bodies, actuators, file)
+    _check_trunk(bodies[0].link, root)
     spec = Spec(
         name=parameters_file.name,
         doc=parameters_file.doc or "",
         folder=folder,
-        files=files,
+        files=files | parts,
         population=parameters_file.population,
         trends=files.get(trends, trends),
         structure=files.get(structure, structure),
         catalogue=files.get(parameters_file.catalogue or ""),
         parameters=_parameters(parameters_file, parameters_source),
-        actuators=_actuators(parameters_file, parameters_source),
-        bodies=expand(tree_file, tree_source),
+        actuators=actuators,
+        bodies=bodies,
         root=root,
         designs={Path(name).stem: _design(read(name)) for name in designs},
         allow={
@@ -216,6 +223,7 @@ def _spec(
         },
         battery=_battery(parameters_file, parameters_source),
         electronics_power=_electronics_power(parameters_file, parameters_source),
+        meshes=meshes,
     )
     check_spec(spec)
     return spec
@@ -288,10 +296,19 @@ def _actuators(file: schema.ParametersFile, source: Source) -> dict[str, Actuato
         by_trend = frozenset(q for q in STATED if asks_for_trend(q, getattr(item, q)))
         where = source.at(path, key=True)
         like_where = source.at((*path, "like"))
+        shape = item.shape and compile_part(item.shape, (*path, "shape"), source)
         result[name] = ActuatorClass(
-            name, item.doc or "", item.like, stated, where, like_where, by_trend, item.kind
+            name, item.doc or "", item.like, stated, where, like_where, by_trend, item.kind, shape
         )
     return result
+
+
+def _check_trunk(link: Link, root: WrittenRoot | None) -> None:
+    """Refuse a trunk whose mass is stated by its density and by its part."""
+    part, density = link.shape, root.density if root else None
+    if part is not None and part.fields.weighs and density is not None:
+        cause = "a 'density' of the trunk, and tree.yaml states the mass of its shape"
+        raise SpecError(Problem(cause, density.where, "remove one of them"))
 
 
 def _battery(file: schema.ParametersFile, source: Source) -> dict[str, Expression]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 from pathlib import Path
 
 from draft.errors import DraftError, SpecError, suggest
@@ -44,6 +45,10 @@ def new_robot(folder: Path, like: str) -> Path:
 def _fill(target: Path, name: str, like: str) -> None:
     source = FOLDERS[like]
     write_schemas(target / SCHEMA_FOLDER)
+    for file in load(source).files:
+        if not file.endswith(".yaml"):  # laws, a table, parts
+            (target / file).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source / file, target / file)
     for path in sorted(source.rglob("*.yaml")):
         relative = path.relative_to(source)
         if relative.parts[0] == "designs":

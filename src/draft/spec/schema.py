@@ -34,6 +34,7 @@ from draft.spec.primitives import LINKS
 from draft.spec.primitives.basic import LinkBase
 from draft.spec.primitives.fixed import FixedBase
 from draft.spec.primitives.root import Trunk
+from draft.spec.primitives.shape import Shape
 
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 _CSV_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.csv")
@@ -133,6 +134,16 @@ class _ActuatorClass(Model):
     like: str | None = None
     """Part of the catalogue to start from: its measured values apply, and the trends predict only
     the effect of deviations from it."""
+    shape: Shape | None = None
+    """Part of your own in place of every actuator of the class."""
+
+    @model_validator(mode="after")
+    def _one_mass(self) -> Self:
+        density = self.shape.density if self.shape else None
+        if density is not None and getattr(self, "mass", None) is not None:
+            remedy = "state one of them, 'mass: ...' [kg] or 'density: ...' [kg/m3]"
+            raise broken_rule("a class with both a 'mass' and the 'density' of its shape", remedy)
+        return self
 
 
 if TYPE_CHECKING:
@@ -151,7 +162,8 @@ else:
             if one.stated
         },
     )
-STATED = tuple(name for name in ActuatorClass.model_fields if name not in ("doc", "kind", "like"))
+_OTHERS = ("doc", "kind", "like", "shape")
+STATED = tuple(name for name in ActuatorClass.model_fields if name not in _OTHERS)
 TREND = "trend"
 
 

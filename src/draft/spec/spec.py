@@ -11,7 +11,10 @@ from draft.errors import Location, counted
 from draft.files import Readable
 from draft.lazy import verb
 from draft.spec.expressions import Expression
+from draft.spec.primitives.base import Written
+from draft.spec.primitives.mesh import Mesh
 from draft.spec.primitives.root import WrittenRoot
+from draft.spec.primitives.shape import Shape
 from draft.spec.tree import Body
 
 if TYPE_CHECKING:
@@ -47,6 +50,7 @@ class ActuatorClass:
     like_where: Location
     by_trend: frozenset[str] = frozenset()
     kind: str | None = None
+    shape: Written[Shape] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +77,8 @@ class Spec:
     Attributes:
         name: name of the robot.
         folder: where it was read from; None if it was made of files in memory.
-        files: the files that determine its designs, by name: the three, and the laws and the table
-            that they name.
+        files: the files that determine its designs, by name: the three, and the laws, the table and
+            the parts that they name.
         population: "humanoid" or "quadruped", the population whose structure trends apply.
         trends: actuator laws: "draft", "paper" or a coefficients file.
         structure: structure trends of the shipped survey, with the trunk by the law "calibrated"
@@ -89,6 +93,7 @@ class Spec:
         payload: index of the body that is a payload on the trunk; None without one.
         battery: stated energy [Wh] and mass [kg] of the battery, by name.
         electronics_power: stated power of computers, sensors and idle drives [W].
+        meshes: parts of one's own, by file and unit.
     """
 
     name: str
@@ -108,6 +113,7 @@ class Spec:
     payload: int | None = None
     battery: Mapping[str, Expression] = field(default_factory=dict)
     electronics_power: Expression | None = None
+    meshes: Mapping[tuple[str, str | None], Mesh] = field(default_factory=dict)
 
     @classmethod
     def parse(cls, files: Mapping[str, str | bytes | Mapping[str, object]]) -> Spec:
@@ -125,7 +131,7 @@ class Spec:
         Args:
             files: texts, or mappings of plain data, by the name that each has in a robot's folder:
                 `parameters.yaml`, `tree.yaml`, `root.yaml` unless the base is fixed, any
-                `designs/NAME.yaml`, and the laws and the table that `parameters.yaml` names.
+                `designs/NAME.yaml`, the laws and the table that `parameters.yaml` names, and parts.
 
         Raises:
             SpecError: listing every problem found, each with the name of its file and its line and

@@ -18,6 +18,7 @@ from draft.spec.links import Joint, Link, read_link
 from draft.spec.primitives.base import Written, compile_part, read_triple
 from draft.spec.primitives.basic import CoupledJoint
 from draft.spec.primitives.fixed import FixedBase, PedestalPart
+from draft.spec.primitives.root import Trunk
 from draft.spec.primitives.wheel import WheelJoint
 from draft.spec.reader import Path_, Source
 
@@ -96,14 +97,16 @@ class _Expander:
         root, path = self.file.tree, ("tree",)
         end_type: type[PedestalPart] | None = None
         end: Written[Model] | None = None
-        placement = Placement(None, None)
+        placement, shape = Placement(None, None), None
+        if isinstance(root, Trunk) and root.shape is not None:
+            shape = compile_part(root.shape, (*path, "shape"), self.source)
         if isinstance(root, FixedBase):
             placement = self.placement(root, path)
             if root.pedestal is not None:
                 end_type = PedestalPart
                 end = compile_part(root.pedestal, (*path, end_type.key), self.source)
         where = self.source.at((*path, "name"))
-        link = Link(root.name, None, None, None, None, end_type, end, where)
+        link = Link(root.name, None, None, None, None, end_type, end, where, shape)
         self.bodies.append(Body(root.name, "", None, link, placement, UNMIRRORED))
         for i, child in enumerate(root.children):
             self.node(child, ("tree", "children", i), 0, "", UNMIRRORED, ())

@@ -83,8 +83,8 @@ def skins(model: Model, segments: int = SEGMENTS) -> dict[Color, Skin]:
         segments: edges of the polygon that stands for a circle.
     """
     parts: dict[Color, list[Skin]] = {}
-    for shape in shapes(model.mujoco, model.design):
-        solid = triangles(shape, model.design, segments)
+    for shape in filter(lambda one: one.drawn, shapes(model.mujoco, model.design)):
+        solid = triangles(shape, segments)
         vertices = solid.points @ shape.rotation.T + shape.position
         bodies = np.full(len(vertices), shape.body)
         red, green, blue = (round(255 * x) for x in colors()[shape.kind][:3])

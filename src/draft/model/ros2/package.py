@@ -20,7 +20,7 @@ from draft.model.folder import check_target, records, write_folder
 from draft.model.model import Model
 from draft.model.ros2 import control
 from draft.model.shapes import matrix
-from draft.model.urdf import DECLARATION, TRUNK, meshes, robot_element, rpy
+from draft.model.urdf import DECLARATION, meshes, robot_element, rpy
 from draft.model.xml import Element
 from draft.values import scalar
 
@@ -52,7 +52,7 @@ ament_package()
 _FOLDERS = {
     "config": ("bridge.yaml", "controllers.yaml", "home.yaml", "robot.rviz"),
     "launch": ("display.launch.py", "gazebo.launch.py"),
-    "meshes": ("trunk.stl",),
+    "meshes": ("trunk.stl", "part.*.stl"),
     "urdf": ("robot.urdf", "robot.urdf.xacro"),
     "worlds": ("floor.sdf",),
 }
@@ -90,7 +90,7 @@ def package_name(design: Design) -> str:
 def package_files(model: Model) -> dict[str, str | bytes]:
     """Contents of the files, by path in the package."""
     design, name = model.design, package_name(model.design)
-    robot = robot_element(model, f"package://{name}/{TRUNK}", gazebo=True)
+    robot = robot_element(model, f"package://{name}/", gazebo=True)
     frames = _add_frames(robot, model)
     parameters = control.controllers(model, frames)
     kinds = parameters["controller_manager"]["ros__parameters"]

@@ -9,7 +9,7 @@ from typing import Literal, TypeVar, get_args, get_origin
 
 from draft.errors import DraftError
 from draft.extensions import Registry
-from draft.spec.primitives.base import COLORS, Color, End
+from draft.spec.primitives.base import COLORS, HIDDEN, HIDDEN_COLOR, Color, End
 from draft.spec.primitives.basic import BasicLink, LinkBase
 from draft.spec.primitives.box import BoxLink
 from draft.spec.primitives.foot import FootLink
@@ -52,7 +52,8 @@ def primitive(link: L) -> L:
 def colors() -> dict[str, Color]:
     """Colours by kind of geom; the kinds that any robot may have come first."""
     ends = [link.end for link in LINKS.values() if link.end is not None]
-    return COLORS | {kind: color for end in ends for kind, color in end.colors.items()}
+    own = {kind: color for end in ends for kind, color in end.colors.items()}
+    return COLORS | {HIDDEN: HIDDEN_COLOR} | own
 
 
 def _fault(link: type[LinkBase]) -> str:

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import (
+    TYPE_CHECKING,
     Any,
     ClassVar,
     Generic,
@@ -35,6 +36,10 @@ from draft.spec.field_types import Model, NamedAxis, Number, broken_rule
 from draft.spec.reader import Path_, Source
 from draft.values import Value, minimum
 
+if TYPE_CHECKING:
+    from draft.spec.primitives.loft import Loft
+    from draft.spec.primitives.mesh import Mesh
+
 AXES: dict[str, tuple[float, float, float]] = {
     "x": (1.0, 0.0, 0.0),
     "y": (0.0, 1.0, 0.0),
@@ -46,7 +51,7 @@ AXES: dict[str, tuple[float, float, float]] = {
 # Largest share of its segment's mass that an end has by default.
 END_SHARE = 0.5
 _NUMBER = get_args(Number)[0]  # the annotated type, which is all that pydantic keeps
-Form = Literal["cylinder", "sphere", "box"]
+Form = Literal["cylinder", "sphere", "box", "mesh"]
 Color = tuple[float, float, float, float]
 Fields = TypeVar("Fields", bound=Model)
 # Colours of the kinds of geom that any robot may have.
@@ -57,6 +62,9 @@ COLORS: dict[str, Color] = {
     "foot": (0.16, 0.16, 0.17, 1),
     "drawn": (0.95, 0.55, 0.20, 1),
 }
+# Kind of the geoms of a part of one's own that are not drawn: what collides, and its inertia.
+HIDDEN = "hidden"
+HIDDEN_COLOR: Color = (0.9, 0.2, 0.2, 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,11 +186,12 @@ class Geom(NamedTuple):
         form: its shape.
         center: its centre [m].
         size: radius and length of a cylinder, radius of a sphere, full sizes of a box along its own
-            x, y and z [m].
+            x, y and z [m]; nothing for a mesh.
         mass: its mass [kg]; None if it is only drawn and occupies no space.
         axis: unit direction of a cylinder.
         collides: whether it collides with the floor and with objects.
-        rotation: frame of a box in that of the body; None for parallel frames.
+        rotation: frame of a box or a mesh in that of the body; None for parallel frames.
+        mesh: the solid of a mesh; its centre is that of its frame.
     """
 
     suffix: str
@@ -194,10 +203,13 @@ class Geom(NamedTuple):
     axis: Vector = (0.0, 0.0, 1.0)
     collides: bool = True
     rotation: Rotation = None
+    mesh: Mesh | Loft | None = None
 
     @property
     def volume(self) -> Value:
         """Volume of the solid [m3]."""
+        if self.mesh is not None:
+            return self.mesh.volume
         if self.form == "cylinder":
             radius, length = self.size
             return math.pi * radius * radius * length
@@ -209,7 +221,7 @@ class Geom(NamedTuple):
 
     @property
     def inertia(self) -> Vector:
-        """Principal moments about its centre [kg m2].
+        """Principal moments about its centre [kg m2], except of a mesh.
 
         About its own x, y and z for a box; for a cylinder the last is about its axis.
         """

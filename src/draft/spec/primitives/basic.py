@@ -6,16 +6,17 @@ The other primitives add an end at the tip of the link.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, Self, get_args
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from draft import geometry as g
 from draft.errors import Problem, ResolveError
-from draft.geometry import Vector
+from draft.geometry import Frame, Vector
 from draft.spec.evaluate import Evaluator
-from draft.spec.field_types import Axis, Model, Name, Number, NumberVector
+from draft.spec.field_types import Axis, Model, Name, Number, NumberVector, broken_rule
 from draft.spec.primitives.base import End, Geom, Written
+from draft.spec.primitives.shape import LinkShape
 from draft.values import Value, every, is_array, maximum, some, where
 
 if TYPE_CHECKING:
@@ -125,6 +126,8 @@ AnyJoint = Annotated[
 class Member(Model):
     """The structural member of a link: a straight cylinder from the link's origin to its tip."""
 
+    absent: ClassVar[Mapping[str, str]] = {"shape": "write it beside 'link', not in it"}
+
     axis: Axis
     """Direction from origin to tip."""
     length: Number
@@ -206,6 +209,10 @@ class Motor(Model):
     shorter edge across the axis from that end.
     """
 
+    absent: ClassVar[Mapping[str, str]] = {
+        "shape": "all actuators of a class have the same: write it in parameters.yaml, in the class"
+    }
+
     actuator: Name
     """Actuator class."""
     axis: Axis
@@ -262,6 +269,14 @@ class MotorPart(NamedTuple):
         axis, center = g.reflect(self.axis, signs), g.reflect(self.center, signs)
         return MotorPart(self.actuator, axis, center, g.reflect(self.long, signs))
 
+    @property
+    def frame(self) -> Frame:
+        """Its frame in that of the link: in its middle, with z along the axis and x along `long`.
+
+        It is turned on a mirrored copy, not mirrored: both sides have the same actuator.
+        """
+        return self.center, g.transposed((self.long, g.cross(self.axis, self.long), self.axis))
+
     def cylinder(self, radius: Value, length: Value, mass: Value) -> Geom:
         """Return a module as a cylinder of a radius [m], length [m] and mass [kg]."""
         size = (radius, length)
@@ -277,9 +292,8 @@ class MotorPart(NamedTuple):
             mass: its mass [kg].
         """
         center = g.add(self.center, g.scale(self.long, (height - width) / 2))
-        rotation = g.transposed((self.long, g.cross(self.axis, self.long), self.axis))
         size = (height, width, length)
-        return Geom("_motor", "actuator", "box", center, size, mass, rotation=rotation)
+        return Geom("_motor", "actuator", "box", center, size, mass, rotation=self.frame[1])
 
 
 _DOWN: Vector = (0.0, 0.0, -1.0)
@@ -374,6 +388,8 @@ class LinkBase(Model):
     """Joint at its origin. Without one the link is fixed to its parent."""
     link: Member | None = None
     """Structural member."""
+    shape: LinkShape | None = None
+    """Part of your own in place of the member."""
     motor: Motor | None = None
     """Actuator at its tip."""
     pulley: Pulley | None = None
@@ -381,6 +397,15 @@ class LinkBase(Model):
     children: list[Node] = Field([])
     """Further links attached to it, besides the next link of its chain."""
     end: ClassVar[type[End] | None] = None
+
+    @model_validator(mode="after")
+    def _shape_of_a_member(self) -> Self:
+        if self.shape is not None and self.link is None:
+            remedy = "add 'link: ...' with its axis and length, or remove 'shape'"
+            raise broken_rule("a shape without a member, whose place it takes", remedy)
+        if self.shape and self.shape.weighs and self.link and self.link.mass is not None:
+            raise broken_rule("the mass of 'link' and that of 'shape'", "remove one of them")
+        return self
 
     @classmethod
     def type_name(cls) -> str:

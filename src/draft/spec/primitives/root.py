@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -9,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from draft import geometry as g
 from draft.errors import Location, Problem, ResolveError, SpecError
 from draft.spec.evaluate import Evaluator
 from draft.spec.expressions import Expression, parse
 from draft.spec.field_types import Model, Name, Number
 from draft.spec.primitives import loft as lofting
+from draft.spec.primitives.base import Geom
+from draft.spec.primitives.shape import LinkShape, ShapePart
 from draft.spec.reader import Path_, Source
 from draft.values import Array, Value, is_array, maximum, minimum
 
@@ -34,6 +38,8 @@ class Trunk(Model):
     name: Name = "trunk"
     """Name of the body."""
     type: Literal["root"] = "root"
+    shape: LinkShape | None = None
+    """Part of your own in place of the solid of root.yaml, in the trunk's frame."""
     children: list[Node] = Field([])
     """Links attached to it."""
 
@@ -65,6 +71,8 @@ class Section(Model):
 
 class RootFile(Model):
     """root.yaml: the trunk as a loft through sections."""
+
+    absent: ClassVar[Mapping[str, str]] = {"shape": "write it in tree.yaml, below 'type: root'"}
 
     axis: Literal["x", "y", "z"]
     """Direction of the loft."""
@@ -159,6 +167,7 @@ class TrunkPart:
         leg_length: stated leg length for the trend of the density [m]; None for the design's own.
         suffix: suffix of the name of its geom, a mesh of kind "trunk".
         site: name of the site at its origin.
+        shape: part in its place; None without one.
     """
 
     suffix: ClassVar[str] = "_trunk"
@@ -169,6 +178,12 @@ class TrunkPart:
     mass: Value
     loft: lofting.Loft
     leg_length: Value | None = None
+    shape: ShapePart | None = None
+
+    def geoms(self) -> Iterator[Geom]:
+        """Its solid, or the part in its place."""
+        solid = Geom(self.suffix, "trunk", "mesh", g.ZERO, (), self.mass, mesh=self.loft)
+        yield from (solid,) if self.shape is None else self.shape.geoms(solid)
 
 
 def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
