@@ -101,7 +101,7 @@ joints, armatures, damping, friction and shapes.
 
 At 1 and 3 m/s the speeds in Drake differ by at most {trained} from MuJoCo's as trained, by at most
 {fine} from those with steps of 1 ms and by at most {hard} from those with hard contacts; at the
-fastest commands, by at most {fastest} from those as trained."""
+other commands, by at most {fastest} from those as trained."""
 COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
 OWNED = ("top_speed", "kick", "walking_power")
 LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.
