@@ -84,11 +84,11 @@ gains little (below); makers' controllers had more time and other rewards. The c
 learnt from nine million steps and climbs a quarter of the leg length, where papers jump. A policy
 of a machine's own: `draft twin FILE --capabilities --train DIR`."""
 ENGINES_TEXT = """\
-Shipped policies in other engines (`python -m benchmarks.other_engine`; {versions}):
-the policy, what it observes and its torques are the same, the physics is another. Speeds are means
-[m/s] of {starts} starts; after a kick of at most that much along x and y, the share of {kicks}
-that does not fall within 2.5 s. Drake reads the SDFormat of `draft export`: masses,
-joints, armatures, damping, friction and shapes.
+Shipped policies in other engines (`python -m benchmarks.other_engine`): the policy, what it
+observes and its torques are the same, the physics is another. Speeds are means [m/s] of {starts}
+starts; after a kick of at most that much along x and y, the share of {kicks} robots that do not
+fall within 2.5 s. Drake reads the SDFormat of `draft export`: masses, joints, armatures, damping,
+friction and shapes.
 
 - MuJoCo: steps of 5 ms and contacts of 20 ms, as in the training of these policies. The next column
   has steps of 1 ms, and `hard` contacts of 4 ms too. MuJoCo Warp has the physics of the first, in
@@ -101,7 +101,7 @@ joints, armatures, damping, friction and shapes.
 
 At 1 and 3 m/s the speeds in Drake differ by at most {trained} from MuJoCo's as trained, by at most
 {fine} from those with steps of 1 ms and by at most {hard} from those with hard contacts; at the
-other commands, by at most {fastest} from those as trained."""
+other commands, by at most {fastest} from those as trained. Versions: {versions}."""
 COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
 OWNED = ("top_speed", "kick", "walking_power")
 LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.
