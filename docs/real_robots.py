@@ -92,7 +92,7 @@ friction and shapes.
 
 - MuJoCo: steps of 5 ms and contacts of 20 ms, as in the training of these policies. The next column
   has steps of 1 ms, and `hard` contacts of 4 ms too. MuJoCo Warp has the physics of the first, in
-  single precision, on the processor.
+  single precision, on the processor; from the same starts and kicks MuJoCo gives the same numbers.
 - Drake: steps of 1 ms. A contact is a point, as in MuJoCo, with Drake's own stiffness: no spec says
   how stiff a foot is, which a hydroelastic contact asks for. The friction of the floor is 1 in all.
   Contacts are approximated by `similar`, which Drake's documentation prefers where impacts matter,
@@ -101,7 +101,8 @@ friction and shapes.
 
 At 1 and 3 m/s the speeds in Drake differ by at most {trained} from MuJoCo's as trained, by at most
 {fine} from those with steps of 1 ms and by at most {hard} from those with hard contacts; at the
-other commands, by at most {fastest} from those as trained. Versions: {versions}."""
+other commands, by at most {fastest} from those as trained.
+Versions: {versions}."""
 COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
 OWNED = ("top_speed", "kick", "walking_power")
 LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.
