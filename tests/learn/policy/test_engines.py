@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from functools import cache
@@ -15,7 +16,7 @@ pytest.importorskip("pydrake.multibody", reason="drake has no wheel for this sys
 
 import draft
 from benchmarks import other_engine
-from benchmarks.engines import FRICTION, STEP, Drake, substeps
+from benchmarks.engines import FRICTION, STEP, Drake, Warp, substeps
 from draft.errors import DraftError
 from draft.learn.policy.play_options import Course
 from draft.learn.policy.playback import Playback, playback
@@ -194,6 +195,46 @@ def test_shorter_steps_alone_change_a_little_and_a_held_torque_is_held() -> None
     substeps(STEP, 0.004)(robot.model, data)
     assert (robot.model.geom_solref[:, 0] == 0.004).all()
     assert robot.model.opt.timestep == robot.policy.timestep
+
+
+@pytest.mark.slow
+def test_mujoco_warp_steps_as_mujoco() -> None:
+    pytest.importorskip("mujoco_warp")
+    robot = walking()
+    data, other = standing(robot), standing(robot)
+    warp = Warp(robot.model)
+    for _ in range(10):
+        warp(robot.model, data)
+        mujoco.mj_step(robot.model, other)
+    assert data.time == pytest.approx(other.time)
+    assert data.qpos == pytest.approx(other.qpos, abs=1e-4)
+    assert data.qvel == pytest.approx(other.qvel, abs=1e-2)
+
+
+def standing(robot: Playback) -> mujoco.MjData:
+    """A state on the floor, in the home pose, with torques."""
+    data = lifted(robot)
+    data.qpos[2] -= 3.0
+    data.qfrc_applied[6:] = 1.0
+    return data
+
+
+def test_what_is_measured_is_kept_and_not_measured_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "rows.json"
+    for _ in range(2):
+        other_engine.main(("cheetah",), engines=("MuJoCo",), starts=1, kicks=1, out=out)
+    found = json.loads(out.read_text(encoding="utf-8"))
+    assert found["versions"].keys() == {"mujoco"}
+    assert [row["skill"] for row in found["rows"]] == ["walk", "run", "run", "run", "push", "push"]
+    for row in found["rows"]:
+        if "command" in row:
+            assert row["falls"] == 0
+            assert row["speed"] == pytest.approx(row["command"], rel=0.2)
+        else:
+            assert row["stood"] in (0.0, 1.0)
+    assert len(capsys.readouterr().out.splitlines()) == len(found["rows"])
 
 
 def test_an_unknown_engine_is_refused_with_those_that_are_known(tmp_path: Path) -> None:
