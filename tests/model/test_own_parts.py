@@ -185,6 +185,9 @@ def test_a_mirrored_link_has_the_mirrored_part() -> None:
     inertias = [compiled.geom(f"{side}_thigh_link_inertia") for side in "LR"]
     assert inertias[1].pos == pytest.approx(flip @ inertias[0].pos)
     assert not np.allclose(inertias[0].pos, inertias[1].pos, atol=1e-4)  # one has a handedness
+    boxes = [_box_tensor(one.size, one.quat) for one in inertias]
+    assert boxes[1] == pytest.approx(flip @ boxes[0] @ flip, rel=1e-9, abs=1e-12)
+    assert np.abs(boxes[0] - np.diag(np.diag(boxes[0]))).max() > 1e-6  # its axes are its own
     points = [_points(compiled, one.id) for one in (left, right)]
     assert _sorted(points[1]) == pytest.approx(_sorted(points[0] @ flip), abs=1e-6)
     for side in "LR":
@@ -203,6 +206,14 @@ def _points(model: mujoco.MjModel, geom: int) -> Array:
     start, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
     mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
     return model.mesh_vert[start : start + count] @ turn.reshape(3, 3).T + model.geom_pos[geom]
+
+
+def _box_tensor(halves: Array, quat: Array) -> Array:
+    """Inertia of a box per mass about its centre, in the frame of its body [m2]."""
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, quat)
+    square = halves**2 / 3
+    return turn.reshape(3, 3) @ np.diag(square.sum() - square) @ turn.reshape(3, 3).T
 
 
 def _sorted(points: Array) -> Array:
