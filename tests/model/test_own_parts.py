@@ -235,6 +235,17 @@ def test_an_actuator_has_its_z_along_the_shaft_and_is_the_same_part_on_both_side
         assert _sorted(found) == pytest.approx(_sorted(expected), abs=1e-6)
 
 
+def test_a_motor_says_where_the_side_of_its_part_is() -> None:
+    block = trimesh.creation.box((0.1, 0.06, 0.05))
+    block.apply_translation((0.02, 0.0, 0.0))
+    motor = {"actuator": "leg", "axis": "y", "long": "-x"}
+    shape = {"file": "m.stl"}
+    chain = leg(thigh={"motor": motor})
+    spec = with_parts({"m.stl": stl(block)}, motor=shape, chain=chain)
+    model = spec.resolve().build().mujoco
+    assert model.geom("thigh_motor_inertia").pos == pytest.approx(np.array([-0.02, 0, -LENGTH]))
+
+
 def test_a_class_takes_its_mass_from_the_density_of_its_part() -> None:
     block = trimesh.creation.box((0.1, 0.1, 0.04))
     files = {"m.stl": stl(block)}
@@ -418,6 +429,33 @@ def test_cad_gets_the_parts_with_their_volumes_on_both_sides(tmp_path: Path) -> 
     (row,) = (one for one in rows if one["name"] == "R_thigh")
     assert row["mass_source"] == "rod.step: stated"
     assert float(row["density_kg_m3"]) == pytest.approx(2700)
+
+
+def test_a_part_of_an_exported_assembly_comes_back_where_it_was(tmp_path: Path) -> None:
+    pytest.importorskip("OCP")
+    from OCP.TopLoc import TopLoc_Location
+
+    from tests.model.test_step import read
+
+    plain = {**leg()[1]["link"], "mass": 1.2, "radius": RADIUS}
+    drawn = robot(leg(thigh={"link": plain}), children=BOTH).resolve().build()
+    _, found = read(drawn.save(tmp_path / "out", ("step",)) / "robot.step")
+    own = {name: found[f"L_{name}"].shape.Located(TopLoc_Location()) for name in PARTS}
+    files = {f"{name}.step": written.step(shape) for name, shape in own.items()}
+    back = with_parts(
+        files,
+        {"thigh": {"file": "thigh.step", "mass": 1.2}},
+        {"file": "thigh_motor.step"},
+        children=BOTH,
+    )
+    a, b = drawn.mujoco, back.resolve().build().mujoco
+    for body in (one.name for one in drawn.design.bodies):
+        assert b.body(body).ipos == pytest.approx(a.body(body).ipos, abs=1e-8), body
+        expected = tensor(a, body)
+        assert np.abs(tensor(b, body) - expected).max() <= 1e-7 * np.trace(expected), body
+
+
+PARTS = ("thigh", "thigh_motor")
 
 
 def test_a_mesh_that_cad_would_take_minutes_for_is_refused(tmp_path: Path) -> None:
