@@ -395,16 +395,19 @@ def test_a_drawing_has_the_part_and_not_what_is_hidden(tmp_path: Path) -> None:
     names = {mesh["name"] for mesh in scene["meshes"]}
     assert {"L_thigh_link_shape", "R_thigh_motor_shape", "trunk_trunk_shape"} <= names
     assert not names & {"L_thigh_link", "L_thigh_link_inertia", "trunk_trunk"}
-    files = sorted(path.name for path in (folder / "meshes").iterdir())
+    files = sorted(path.name for path in (folder / "meshes").glob("*.stl"))
+    assert [f"{name[:-4]}.obj" for name in files] == sorted(
+        path.name for path in (folder / "meshes").glob("*.obj")
+    )
     assert files == [
         *("part.box.stl", "part.hook.stl", "part.hook.y.stl", "part.motor.stl", "trunk.stl")
     ]
     left, right = (trimesh.load_mesh(folder / "meshes" / files[k]) for k in (1, 2))
     assert left.volume == pytest.approx(hook().volume, rel=1e-5)
     assert right.volume == pytest.approx(left.volume, rel=1e-5)
-    for file in ("robot.urdf", "robot.sdf"):
+    for file, kind in (("robot.urdf", "stl"), ("robot.sdf", "obj")):
         text = (folder / file).read_text(encoding="utf-8")
-        assert "meshes/part.hook.y.stl" in text
+        assert f"meshes/part.hook.y.{kind}" in text
         assert "link_inertia" not in text
     assert model.save(folder, ("mjcf",)) == folder  # what it wrote before is its own
 

@@ -140,11 +140,10 @@ def urdf(model: Model) -> dict[str, str | bytes]:
     }
 
 
-@exporter("robot.sdf", "model.config", *_MESHES)
+@exporter("robot.sdf", "model.config", "meshes/trunk.obj", "meshes/part.*.obj")
 def sdf(model: Model) -> dict[str, str | bytes]:
     """SDFormat with the meshes of trunk and parts, as a folder that Gazebo finds as a model."""
-    from draft.model.sdf import model_config, robot_sdf
-    from draft.model.urdf import meshes
+    from draft.model.sdf import meshes, model_config, robot_sdf
 
     return {
         "robot.sdf": robot_sdf(model),

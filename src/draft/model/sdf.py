@@ -13,30 +13,32 @@ from typing import TYPE_CHECKING
 
 import mujoco
 
-from draft.design.design import Body
+from draft.design.design import Body, Design
 from draft.model.mjcf import colors
-from draft.model.shapes import Shape, matrix, shapes
+from draft.model.shapes import Shape, matrix, mesh_geoms, shapes
 from draft.model.urdf import (
     DECLARATION,
     LEAST_MASS,
     distinct_name,
     joint_name,
-    mesh_file,
     rpy,
     tensor,
 )
 from draft.model.xml import Element
 from draft.spec.primitives.base import Color
+from draft.spec.primitives.loft import Loft
+from draft.spec.primitives.mesh import Mesh
 from draft.values import scalar
 
 if TYPE_CHECKING:
     from draft.model.model import Model
 
 VERSION = "1.11"  # The first with `mimic`.
+TRUNK = "meshes/trunk.obj"  # Drake finds contacts with OBJ, and refuses STL.
 
 
 def robot_sdf(model: Model) -> str:
-    """SDFormat text of the robot; it refers to the meshes of `meshes` in the same folder."""
+    """SDFormat text of the robot; it refers to the files of `meshes` in the same folder."""
     design, compiled = model.design, model.mujoco
     root = Element("sdf", version=VERSION, **{"xmlns:drake": "http://drake.mit.edu"})
     robot = root.add("model", name=design.name, canonical_link=design.bodies[0].name)
@@ -61,6 +63,24 @@ def model_config(model: Model) -> str:
     root.put("sdf", "robot.sdf", version=VERSION)
     root.put("description", f"{model.design.reference}, written by Draft")
     return DECLARATION + root.text()
+
+
+def meshes(design: Design) -> dict[str, str]:
+    """Texts of the meshes of the trunk and of parts (Wavefront OBJ, [m]) by their paths."""
+    found = (geom.mesh for geom in mesh_geoms(design).values())
+    return {mesh_file(mesh): _obj(mesh) for mesh in found if mesh is not None}
+
+
+def mesh_file(mesh: Loft | Mesh) -> str:
+    """Path of a mesh in the folder of a model."""
+    return f"meshes/{mesh.name}.obj" if isinstance(mesh, Mesh) else TRUNK
+
+
+def _obj(mesh: Loft | Mesh) -> str:
+    points = (" ".join(f"{x:.10g}" for x in point) for point in mesh.vertices.tolist())
+    faces = (" ".join(map(str, face)) for face in (mesh.faces() + 1).tolist())
+    lines = [*(f"v {point}" for point in points), *(f"f {face}" for face in faces)]
+    return "\n".join(lines) + "\n"
 
 
 def _link(
