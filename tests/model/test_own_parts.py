@@ -185,6 +185,9 @@ def test_a_mirrored_link_has_the_mirrored_part() -> None:
     inertias = [compiled.geom(f"{side}_thigh_link_inertia") for side in "LR"]
     assert inertias[1].pos == pytest.approx(flip @ inertias[0].pos)
     assert not np.allclose(inertias[0].pos, inertias[1].pos, atol=1e-4)  # one has a handedness
+    boxes = [_box_tensor(one.size, one.quat) for one in inertias]
+    assert boxes[1] == pytest.approx(flip @ boxes[0] @ flip, rel=1e-9, abs=1e-12)
+    assert np.abs(boxes[0] - np.diag(np.diag(boxes[0]))).max() > 1e-6  # its axes are its own
     points = [_points(compiled, one.id) for one in (left, right)]
     assert _sorted(points[1]) == pytest.approx(_sorted(points[0] @ flip), abs=1e-6)
     for side in "LR":
@@ -205,6 +208,14 @@ def _points(model: mujoco.MjModel, geom: int) -> Array:
     return model.mesh_vert[start : start + count] @ turn.reshape(3, 3).T + model.geom_pos[geom]
 
 
+def _box_tensor(halves: Array, quat: Array) -> Array:
+    """Inertia of a box per mass about its centre, in the frame of its body [m2]."""
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, quat)
+    square = halves**2 / 3
+    return turn.reshape(3, 3) @ np.diag(square.sum() - square) @ turn.reshape(3, 3).T
+
+
 def _sorted(points: Array) -> Array:
     return points[np.lexsort(np.round(points, 5).T)]
 
@@ -222,6 +233,17 @@ def test_an_actuator_has_its_z_along_the_shaft_and_is_the_same_part_on_both_side
         assert np.linalg.det(turn) == pytest.approx(1)
         expected = local @ turn.T + (0, 0, -LENGTH)
         assert _sorted(found) == pytest.approx(_sorted(expected), abs=1e-6)
+
+
+def test_a_motor_says_where_the_side_of_its_part_is() -> None:
+    block = trimesh.creation.box((0.1, 0.06, 0.05))
+    block.apply_translation((0.02, 0.0, 0.0))
+    motor = {"actuator": "leg", "axis": "y", "long": "-x"}
+    shape = {"file": "m.stl"}
+    chain = leg(thigh={"motor": motor})
+    spec = with_parts({"m.stl": stl(block)}, motor=shape, chain=chain)
+    model = spec.resolve().build().mujoco
+    assert model.geom("thigh_motor_inertia").pos == pytest.approx(np.array([-0.02, 0, -LENGTH]))
 
 
 def test_a_class_takes_its_mass_from_the_density_of_its_part() -> None:
@@ -373,16 +395,19 @@ def test_a_drawing_has_the_part_and_not_what_is_hidden(tmp_path: Path) -> None:
     names = {mesh["name"] for mesh in scene["meshes"]}
     assert {"L_thigh_link_shape", "R_thigh_motor_shape", "trunk_trunk_shape"} <= names
     assert not names & {"L_thigh_link", "L_thigh_link_inertia", "trunk_trunk"}
-    files = sorted(path.name for path in (folder / "meshes").iterdir())
+    files = sorted(path.name for path in (folder / "meshes").glob("*.stl"))
+    assert [f"{name[:-4]}.obj" for name in files] == sorted(
+        path.name for path in (folder / "meshes").glob("*.obj")
+    )
     assert files == [
         *("part.box.stl", "part.hook.stl", "part.hook.y.stl", "part.motor.stl", "trunk.stl")
     ]
     left, right = (trimesh.load_mesh(folder / "meshes" / files[k]) for k in (1, 2))
     assert left.volume == pytest.approx(hook().volume, rel=1e-5)
     assert right.volume == pytest.approx(left.volume, rel=1e-5)
-    for file in ("robot.urdf", "robot.sdf"):
+    for file, kind in (("robot.urdf", "stl"), ("robot.sdf", "obj")):
         text = (folder / file).read_text(encoding="utf-8")
-        assert "meshes/part.hook.y.stl" in text
+        assert f"meshes/part.hook.y.{kind}" in text
         assert "link_inertia" not in text
     assert model.save(folder, ("mjcf",)) == folder  # what it wrote before is its own
 
@@ -407,6 +432,33 @@ def test_cad_gets_the_parts_with_their_volumes_on_both_sides(tmp_path: Path) -> 
     (row,) = (one for one in rows if one["name"] == "R_thigh")
     assert row["mass_source"] == "rod.step: stated"
     assert float(row["density_kg_m3"]) == pytest.approx(2700)
+
+
+def test_a_part_of_an_exported_assembly_comes_back_where_it_was(tmp_path: Path) -> None:
+    pytest.importorskip("OCP")
+    from OCP.TopLoc import TopLoc_Location
+
+    from tests.model.test_step import read
+
+    plain = {**leg()[1]["link"], "mass": 1.2, "radius": RADIUS}
+    drawn = robot(leg(thigh={"link": plain}), children=BOTH).resolve().build()
+    _, found = read(drawn.save(tmp_path / "out", ("step",)) / "robot.step")
+    own = {name: found[f"L_{name}"].shape.Located(TopLoc_Location()) for name in PARTS}
+    files = {f"{name}.step": written.step(shape) for name, shape in own.items()}
+    back = with_parts(
+        files,
+        {"thigh": {"file": "thigh.step", "mass": 1.2}},
+        {"file": "thigh_motor.step"},
+        children=BOTH,
+    )
+    a, b = drawn.mujoco, back.resolve().build().mujoco
+    for body in (one.name for one in drawn.design.bodies):
+        assert b.body(body).ipos == pytest.approx(a.body(body).ipos, abs=1e-8), body
+        expected = tensor(a, body)
+        assert np.abs(tensor(b, body) - expected).max() <= 1e-7 * np.trace(expected), body
+
+
+PARTS = ("thigh", "thigh_motor")
 
 
 def test_a_mesh_that_cad_would_take_minutes_for_is_refused(tmp_path: Path) -> None:

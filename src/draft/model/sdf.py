@@ -21,7 +21,6 @@ from draft.model.urdf import (
     LEAST_MASS,
     distinct_name,
     joint_name,
-    mesh_file,
     rpy,
     tensor,
 )
@@ -35,10 +34,11 @@ if TYPE_CHECKING:
     from draft.model.model import Model
 
 VERSION = "1.11"  # The first with `mimic`.
+TRUNK = "meshes/trunk.obj"  # Drake finds contacts with OBJ, and refuses STL.
 
 
 def robot_sdf(model: Model) -> str:
-    """SDFormat text of the robot; it refers to the meshes of `meshes` in the same folder."""
+    """SDFormat text of the robot; it refers to the files of `meshes` in the same folder."""
     design, compiled = model.design, model.mujoco
     root = Element("sdf", version=VERSION, **{"xmlns:drake": "http://drake.mit.edu"})
     robot = root.add("model", name=design.name, canonical_link=design.bodies[0].name)
