@@ -33,12 +33,12 @@ from draft.learn.policy.policy import policy
 RESULTS = Path(__file__).resolve().parents[1] / "examples/results/other_engine.json"
 ENGINES: dict[str, Callable[[mujoco.MjModel, Path], Advance]] = {
     "MuJoCo": lambda model, file: mujoco.mj_step,
-    "MuJoCo, 1 ms": lambda model, file: substeps(STEP),
-    "MuJoCo, hard": lambda model, file: substeps(STEP, HARD),
+    "MuJoCo 1 ms": lambda model, file: substeps(STEP),
+    "MuJoCo hard": lambda model, file: substeps(STEP, HARD),
     "MuJoCo Warp": lambda model, file: Warp(model),
     "Drake": lambda model, file: Drake(file),
-    "Drake, sap": lambda model, file: Drake(file, "sap"),
-    "Drake, lagged": lambda model, file: Drake(file, "lagged"),
+    "Drake sap": lambda model, file: Drake(file, "sap"),
+    "Drake lagged": lambda model, file: Drake(file, "lagged"),
 }
 HARD = 0.004  # Time constant of contacts [s]; the shipped policies learnt with 20 ms.
 SPEEDS = (1.0, 3.0)  # Commands of a run besides the largest of the training [m/s].

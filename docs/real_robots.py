@@ -453,8 +453,8 @@ def _engines() -> list[str]:
         starts=_ends([row["roll_outs"] for row in known["rows"] if "speed" in row]),
         kicks=_ends([row["roll_outs"] for row in known["rows"] if "stood" in row]),
         trained=gap("MuJoCo"),
-        fine=gap("MuJoCo, 1 ms"),
-        hard=gap("MuJoCo, hard"),
+        fine=gap("MuJoCo 1 ms"),
+        hard=gap("MuJoCo hard"),
         fastest=gap("MuJoCo", judged=False),
     )
     return ["## Another engine", "", *text.splitlines(), "", *lines, ""]
