@@ -21,6 +21,7 @@ from draft.model.urdf import (
     LEAST_MASS,
     distinct_name,
     joint_name,
+    mesh_file,
     rpy,
     tensor,
 )
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from draft.model.model import Model
 
 VERSION = "1.11"  # The first with `mimic`.
-TRUNK = "meshes/trunk.obj"  # Drake finds contacts with OBJ, and refuses STL.
 
 
 def robot_sdf(model: Model) -> str:
