@@ -85,14 +85,14 @@ def suggest(name: str, available: Iterable[str], what: str = "available") -> str
 
     Args:
         name: the unknown name.
-        available: the known names; of more than 30 only the nearest few are listed.
+        available: the known names; of more than 40 only the nearest few are listed.
         what: plural noun for the names, such as "parameters".
     """
     names = sorted(set(available))
     # Comparing with every name is slow where there are thousands.
     cutoff = 0.0 if len(names) <= 200 else 0.6
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    shown = names if len(names) <= 30 else difflib.get_close_matches(name, names, 6, cutoff)
+    shown = names if len(names) <= 40 else difflib.get_close_matches(name, names, 6, cutoff)
     rest = f" and {len(names) - len(shown)} more" if len(shown) < len(names) else ""
     listed = f"{what}: {', '.join(shown) or 'none'}{rest}"
     if names and not shown:
