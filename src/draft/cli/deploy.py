@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
-from draft.cli.options import DESIGN_FORMS, check_folder
+from draft.cli.options import DESIGN_FORMS, ShippedSkill, check_folder
 from draft.errors import DraftError
 
 
@@ -28,14 +28,7 @@ def main(
             metavar="DIR", help="Folder of the controller; replaces one that Draft wrote there."
         ),
     ],
-    skill: Annotated[
-        Literal["walk", "run", "climb", "push"] | None,
-        tyro.conf.arg(
-            metavar="{walk,run,climb,push}",
-            help="Which of the policies that ship.",
-            help_behavior_hint="(default: walk)",
-        ),
-    ] = None,
+    skill: ShippedSkill = None,
     policy: Annotated[
         str | None,
         tyro.conf.arg(

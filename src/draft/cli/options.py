@@ -112,6 +112,14 @@ OwnPolicies = Annotated[
         help_behavior_hint="(default: none)",
     ),
 ]
+ShippedSkill = Annotated[
+    Literal["walk", "run", "climb", "push"] | None,
+    tyro.conf.arg(
+        metavar="{walk,run,climb,push}",
+        help="Which of the policies that ship.",
+        help_behavior_hint="(default: walk)",
+    ),
+]
 HostOption = Annotated[
     str,
     tyro.conf.arg(metavar="ADDRESS", help="Address of the page; a public one needs --token."),

@@ -16,6 +16,7 @@ from draft.cli.options import (
     HostOption,
     OwnPolicies,
     PortOption,
+    ShippedSkill,
     TokenOption,
 )
 from draft.cli.play_output import FRAMES, Output, output
@@ -55,14 +56,7 @@ def main(
     ],
     /,
     *,
-    skill: Annotated[
-        Literal["walk", "run", "climb", "push"] | None,
-        tyro.conf.arg(
-            metavar="{walk,run,climb,push}",
-            help="What a shipped policy is to show.",
-            help_behavior_hint="(default: walk)",
-        ),
-    ] = None,
+    skill: ShippedSkill = None,
     policy: OwnPolicies = (),
     web: Annotated[
         bool, tyro.conf.arg(help="Show it in the browser until Ctrl-C, with sliders to steer.")
