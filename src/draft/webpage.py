@@ -35,7 +35,7 @@ def webpage(
         requests: whether scripts may send requests to the server of the page.
         modules: address of each module by the name that `import` gives it; None without modules.
         compiles: whether modules may compile WebAssembly.
-        frames: whether the body has pages with such modules, which its policy holds for too.
+        frames: whether the body embeds such pages as `srcdoc`, which inherit this policy.
     """
     policy = _POLICY + (_SCRIPTS if scripts else _PICTURES)
     policy = policy.replace("script-src", _MODULES) if modules is not None or frames else policy

@@ -27,10 +27,12 @@ from hypothesis import strategies as st
 
 import draft
 from draft.cli import main
+from draft.design.legs import _first_moment
 from draft.design.report import mass_by_origin, own_parts, report
 from draft.errors import ModelError, ResolveError, SpecError
 from draft.extensions import Registry
 from draft.model.batch import build_batch
+from draft.model.model import preview
 from draft.spec.primitives.mesh import closed
 from draft.studio.skins import skins
 from draft.values import scalar
@@ -372,6 +374,41 @@ def _width(design: draft.Design) -> float:
     return scalar((high - low) / design.mass)
 
 
+def test_the_report_has_the_stated_centre_and_inertia_of_a_trunk() -> None:
+    trunk = report(everything().resolve())["trunk"]
+    assert trunk["com_m"] == pytest.approx([0.02, 0, 0.01])
+    # Products have the signs of URDF.
+    expected = [[0.05, 0.01, 0.002], [0.01, 0.14, 0], [0.002, 0, 0.16]]
+    found = np.array(trunk["inertia_kg_m2"])
+    assert found == pytest.approx(np.array(expected), rel=1e-9, abs=1e-12)
+
+
+def test_loads_of_the_home_pose_count_the_centres_of_parts() -> None:
+    design = everything().resolve()
+    model = preview(design).mujoco
+    for body in design.bodies[1:]:
+        compiled = model.body(body.name)
+        expected = compiled.mass[0] * compiled.ipos
+        assert np.array(_first_moment(body)) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_part_of_a_link_with_a_stated_mass_is_stated() -> None:
+    chain = leg(thigh={"shape": {"file": "a.stl"}})
+    chain[1]["link"] = {**chain[1]["link"], "mass": 0.31}
+    design = with_parts({"a.stl": stl(prism())}, chain=chain).resolve()
+    assert [one["origin"] for one in own_parts(design)] == ["stated"]
+
+
+@pytest.mark.parametrize("data", [b"ISO-10303-21;\nnonsense", b"solid"])
+def test_a_bad_step_file_says_nothing_on_stdout(
+    data: bytes, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("OCP")
+    with pytest.raises(SpecError, match=r"finds no STEP|no solid"):
+        with_parts({"a.step": data}, {"thigh": {"file": "a.step"}})
+    assert capfd.readouterr().out == ""
+
+
 def test_pages_and_the_command_line_show_the_parts(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -537,7 +574,9 @@ def test_without_the_extra_the_message_names_it(monkeypatch: pytest.MonkeyPatch)
     for name in [name for name in sys.modules if name.partition(".")[0] == "OCP"]:
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, "OCP", None)
-    with pytest.raises(SpecError, match=r"OCP is not installed, which reads STEP\n.*cad.*as STL"):
+    with pytest.raises(
+        SpecError, match=r"OCP is not installed, which STEP files need\n.*cad.*as STL"
+    ):
         with_parts({"a.step": b"ISO-10303-21;"}, {"thigh": {"file": "a.step"}})
 
 

@@ -18,6 +18,7 @@ from draft.errors import DraftError
 from draft.extras import check
 
 EXTRA = "page"
+MOST = 6  # Robots of a page.
 _RUNTIME = re.compile(r'import \{[^}]*\} from "\./rolldown-runtime-[\w-]+\.js";')
 
 

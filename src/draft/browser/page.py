@@ -14,7 +14,7 @@ from typing import Any, cast
 from draft import drawing, files
 from draft.browser import pyodide
 from draft.browser.designer import source
-from draft.browser.engine import engine
+from draft.browser.engine import MOST, engine
 from draft.browser.grid import Grid, grid
 from draft.browser.robots import PageRobot, compiled, driven, network_part, robot
 from draft.design import Design
@@ -28,7 +28,6 @@ from draft.spec import Spec
 from draft.variation.axes import Vary
 from draft.webpage import webpage
 
-MOST = 6
 SKILLS = ("walk", "run", "push")
 _MODULES = (
     "bodies",

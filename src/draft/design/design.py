@@ -87,6 +87,17 @@ class Body(NamedTuple):
         return g.scale(self.link.tip, self.member_centre) if shape is None else shape.com
 
     @property
+    def motor_com(self) -> Vector:
+        """Centre of mass of its actuator, or of the part in its place [m]."""
+        motor, a = self.link.motor, self.actuator
+        if motor is None or a is None or (solid := self.motor_geom) is None:
+            return g.ZERO
+        if a.shape is None:
+            return solid.center
+        at, turn = motor.frame
+        return g.add(at, g.rotate(turn, a.shape.com))
+
+    @property
     def shapes(self) -> tuple[tuple[str, ShapePart], ...]:
         """Parts that it has in place of its own solid and of its actuator, each with the place."""
         parts = ("link", self.link.shape), ("motor", self.actuator and self.actuator.shape)

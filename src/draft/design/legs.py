@@ -318,5 +318,5 @@ def _first_moment(body: Body) -> Vector:
     if link.end is not None and link.end.center is not g.ZERO:
         moment = g.add(moment, g.scale(link.end.center, body.end_mass))
     if (motor := body.motor_geom) is not None and motor.mass is not None:
-        moment = g.add(moment, g.scale(motor.center, motor.mass))
+        moment = g.add(moment, g.scale(body.motor_com, motor.mass))
     return moment

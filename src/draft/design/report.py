@@ -274,11 +274,14 @@ def own_parts(design: Design) -> list[dict[str, Any]]:
     for body in design.bodies:
         for place, part in body.shapes:
             mass, of = body.member_mass, body.link.name
-            origin = "trend" if part.mass is None else "stated"
+            member = body.link.member
+            stated = part.mass is not None or (member is not None and member.mass is not None)
+            origin = "stated" if stated else "trend"
             if place == "motor" and (actuator := body.actuator) is not None:
                 mass, of, origin = actuator.mass, actuator.name, actuator.origins["mass"].kind
             elif body.parent is None and design.lofted is not None:
                 mass = design.lofted.mass
+                origin = "stated" if design.lofted.density_stated else "trend"
             mesh = part.mesh
             record = records.setdefault(
                 (place, of),
@@ -367,14 +370,17 @@ def _trunk(design: Design, population: Population) -> dict[str, Any] | None:
     if leg is not None:
         origin["inputs"] = {"volume": trunk.loft.volume, "leg_length": leg}
         origin["leg_length_origin"] = "design" if trunk.leg_length is None else "stated"
-    solid = trunk.loft if trunk.shape is None else trunk.shape.mesh
+    com = trunk.loft.com.tolist()
+    inertia = trunk.loft.inertia * (trunk.mass / trunk.loft.volume)
+    if trunk.shape is not None:
+        com, inertia = list(trunk.shape.com), trunk.shape.inertia(trunk.mass)
     if trunk.shape is not None and trunk.shape.mass is not None:
         origin["from"] = trunk.shape.mesh.file
     return {
         "mass_kg": trunk.mass,
         "volume_m3": trunk.loft.volume,
-        "com_m": solid.com.tolist(),
-        "inertia_kg_m2": (solid.inertia * (trunk.mass / solid.volume)).tolist(),
+        "com_m": com,
+        "inertia_kg_m2": inertia.tolist(),
         "density_kg_m3": {"value": trunk.density} | origin,
     }
 

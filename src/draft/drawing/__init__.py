@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _FOLDER = files("draft.drawing")
-_OWN = ("figure", "view")
+_OWN = ("figure", "packed", "view")
 _FIELDS = ("geom_type", "geom_size", "geom_pos", "geom_quat", "geom_bodyid", "geom_rgba")
 _MESH = ("mesh_vertadr", "mesh_vertnum", "mesh_faceadr", "mesh_facenum", "mesh_face")
 
@@ -53,7 +53,7 @@ def geoms(model: mujoco.MjModel) -> dict[str, Any]:
 
 
 def packed(values: ArrayLike, kind: str) -> dict[str, str]:
-    """Numbers as bytes; kind is "f4", "i4", "i2", "i1" or "u1"."""
+    """Numbers as bytes of a kind, "f4" or "i2"; `packed.js` reads them."""
     raw = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
     return {"dtype": kind, "bdata": base64.b64encode(raw).decode()}
 

@@ -81,7 +81,8 @@ def _links(design: Design, record: Mapping[str, Any]) -> Iterator[dict[str, obje
         if i == 0 and (trunk := design.lofted) is not None:
             solid = trunk.loft if part is None else part.mesh
             mass, volume = mass + trunk.mass, volume + solid.volume
-            sources.append(f"density: {_source(record['trunk']['density_kg_m3'])}")
+            if part is None or part.mass is None:
+                sources.append(f"density: {_source(record['trunk']['density_kg_m3'])}")
         if body.end_mass and (body.carries or body.parent is None):
             sources.append("end stated")
         if scalar(volume) > 0:

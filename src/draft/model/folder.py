@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 # The dumper of libyaml writes the same text five times as fast; some builds of PyYAML lack it.
 _Dumper: type[yaml.SafeDumper] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _REMEDY = "choose another `out`"
+_BYTECODE = "__pycache__"
 
 
 def save(
@@ -134,8 +135,10 @@ def check_target(folder: Path, known: Set[str], what: str) -> None:
             raise DraftError(f"'{folder}' exists and is not a folder", _REMEDY)
         if not folder.is_dir() or not any(folder.iterdir()):
             return
-        found = (path.relative_to(folder).as_posix() for path in folder.rglob("*"))
-        others = sorted(path for path in found if not is_known(path, known))
+        found = (path.relative_to(folder) for path in folder.rglob("*"))
+        # Whoever runs a file of Python there leaves its bytecode.
+        written = (path.as_posix() for path in found if _BYTECODE not in path.parts)
+        others = sorted(path for path in written if not is_known(path, known))
         if others or not (folder / "report.json").is_file():
             held = f"it holds {', '.join(others[:4])}" if others else "it has no report.json"
             cause = f"'{folder}' is not a folder of a {what} ({held}); it is kept"

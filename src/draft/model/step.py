@@ -1,7 +1,7 @@
 """Export to STEP (ISO 10303-21, AP214) for CAD: an assembly in the home pose, in millimetres.
 
 Every link and every actuator is a part, with the name, the solids and the colours that Draft draws.
-A part has the frame of its link; that of an actuator is in its middle, with z along the shaft. The
+A part has the frame of its link; that of an actuator is on its axis, with z along the shaft. The
 trunk is the faceted solid that is weighed, with coplanar triangles as one face. A part of one's own
 is the solid of its STEP file, or of its triangles. STEP has no joints:
 an axis is a line in a part of its own, as CAD programs exchange construction geometry, from a point
@@ -28,7 +28,7 @@ from draft.spec.primitives import colors
 from draft.spec.primitives.base import Geom
 from draft.spec.primitives.loft import Loft
 from draft.spec.primitives.mesh import Mesh
-from draft.spec.step_file import kernel, solids
+from draft.spec.step_file import kernel, quiet, solids
 from draft.values import Array, Value, scalar
 
 if TYPE_CHECKING:
@@ -306,10 +306,7 @@ class _Assembly:
             ModelError: the kernel cannot write it.
         """
         self._shapes.UpdateAssemblies()
-        # It prints statistics on stdout, where commands print JSON.
-        message = kernel("Message")
-        for printer in message.Message.DefaultMessenger_s().Printers():
-            printer.SetTraceLevel(message.Message_Gravity.Message_Fail)
+        quiet()
         writer = kernel("STEPCAFControl").STEPCAFControl_Writer()
         writer.SetMaterialMode(True)
         as_is = kernel("STEPControl").STEPControl_StepModelType.STEPControl_AsIs

@@ -10,7 +10,6 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-from draft.browser.page import single_page
 from draft.drawing import inlined, modules
 from draft.explore.comparison_tables import section as comparison_section
 from draft.extras import missing, own_version

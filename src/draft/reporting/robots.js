@@ -1,16 +1,11 @@
 // Robots of a report at one scale: recorded gaits over marks on the floor, or home poses.
 import * as THREE from "three";
 import { Figure } from "draft/figure";
+import { unpack } from "draft/packed";
 import { View } from "draft/view";
 
-const KINDS = /** @type {any} */ ({ f4: Float32Array, i2: Int16Array });
 const MARKS = 64; // Most marks below a robot.
 const $ = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
-
-/** @param {{dtype: string, bdata: string}} packed */
-function unpack({ dtype, bdata }) {
-  return new KINDS[dtype](Uint8Array.from(atob(bdata), (c) => c.charCodeAt(0)).buffer);
-}
 
 /** A robot with the frames of its gait, of which a standing one has one. */
 class Recorded {
@@ -20,7 +15,6 @@ class Recorded {
    * @param {number} mark distance between two marks [m]
    */
   constructor(view, robot, mark) {
-    Object.assign(this, robot);
     this.robot = robot;
     this.mark = mark;
     this.frames = robot.frames;
@@ -95,6 +89,7 @@ class Scene {
     this.time = 0;
     this.last = 0;
     this.playing = false;
+    this.pending = 0; // Number of the next picture that was asked for.
     this.visible = true;
     this.draw();
     if ($("walk-play")) this.controls();
@@ -121,15 +116,15 @@ class Scene {
 
   /** @param {boolean} on */
   play(on) {
-    this.playing = on;
     $("walk-play").textContent = on ? "Pause" : "Play";
     this.last = performance.now();
-    if (on) requestAnimationFrame((now) => this.frame(now));
+    cancelAnimationFrame(this.pending);
+    this.playing = on;
+    if (on) this.pending = requestAnimationFrame((now) => this.frame(now));
   }
 
   /** @param {number} now [ms] */
   frame(now) {
-    if (!this.playing) return;
     const gone = (now - this.last) / 1000;
     this.last = now;
     this.time += Math.max(0, Math.min(gone, 0.1)) * Number($("walk-speed").value);
@@ -137,13 +132,15 @@ class Scene {
       this.view.pace(gone);
       this.draw();
     }
-    requestAnimationFrame((next) => this.frame(next));
+    this.pending = requestAnimationFrame((next) => this.frame(next));
   }
 }
 
 try {
   Object.assign(window, { draftRobots: new Scene() }); // For tests and measurements.
 } catch (error) {
+  const { message } = /** @type {Error} */ (error);
   console.warn(error);
-  $("robots-view").textContent = "This browser offers no WebGL, which the picture of the robots needs.";
+  $("robots-view").textContent = /WebGL/i.test(message)
+    ? "This browser offers no WebGL, which the picture of the robots needs." : `The robots cannot be drawn here: ${message}`;
 }

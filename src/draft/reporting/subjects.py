@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from draft.browser.engine import MOST as MOST_LIVE
 from draft.browser.engine import available
-from draft.browser.page import MOST as MOST_LIVE
 from draft.design import Design
 from draft.design.report import report
 from draft.errors import DraftError, ModelError

@@ -47,7 +47,9 @@ def read_parts(
             files[path] = file(path)
             stem = name = f"part.{PurePosixPath(path).stem}"  # No body has a dot.
             number = 1
-            while name in {mesh.name for mesh in meshes.values()}:
+            # Names of files that differ by case alone are one on some systems.
+            taken = {mesh.name.casefold() for mesh in meshes.values()}
+            while name.casefold() in taken:
                 number += 1
                 name = f"{stem}_{number}"
             meshes[path, unit] = _read(shape, files[path], name)
@@ -63,7 +65,8 @@ def _read(shape: Written[Any], file: Readable, name: str) -> Mesh:
         raise SpecError(Problem(f"'{path}': {error}", where, error.remedy)) from None
     except ValueError as error:
         cause = f"'{path}' cannot be read: {error}"
-        raise SpecError(Problem(cause, where, "export it again as binary STL")) from None
+        remedy_ = "correct it, or export it again as binary STL"
+        raise SpecError(Problem(cause, where, remedy_)) from None
 
 
 def _bytes(file: Readable, path: str, where: Location) -> bytes:
@@ -90,7 +93,7 @@ def _bytes(file: Readable, path: str, where: Location) -> bytes:
 
 
 # A robot is read again at every edit, its parts only when they change.
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def _mesh(data: bytes, path: str, unit: str | None, name: str) -> Mesh:
     """Mesh of a file's content.
 
@@ -107,7 +110,7 @@ def _mesh(data: bytes, path: str, unit: str | None, name: str) -> Mesh:
         except DraftError as error:
             missing = error.problems[0].cause
             raise MeshError(
-                f"{missing}, which reads STEP", f"{remedy('cad')}, or export the part as STL"
+                f"{missing}, which STEP files need", f"{remedy('cad')}, or export the part as STL"
             ) from None
     triangles = read_triangles(data, PurePosixPath(path.lower()).suffix)
     return closed(triangles * UNITS[unit or "m"], name, path)

@@ -28,6 +28,13 @@ def kernel(module: str) -> Any:
     return need(f"OCP.{module}", "cad")
 
 
+def quiet() -> None:
+    """Let the kernel print nothing: it writes on stdout, where commands print JSON."""
+    messenger = kernel("Message").Message.DefaultMessenger_s()
+    for printer in [*messenger.Printers()]:
+        messenger.RemovePrinter(printer)
+
+
 def solids(data: bytes) -> Any:
     """Solids of a file as one compound of the kernel [mm].
 
@@ -35,10 +42,7 @@ def solids(data: bytes) -> Any:
         DraftError: the extra `cad` is not installed.
         MeshError: it is no STEP file, or has no solids.
     """
-    # It prints on stdout what it thinks of a file.
-    message = kernel("Message")
-    for printer in message.Message.DefaultMessenger_s().Printers():
-        printer.SetTraceLevel(message.Message_Gravity.Message_Fail)
+    quiet()
     reader = kernel("STEPControl").STEPControl_Reader()
     status = reader.ReadStream("part.step", io.BytesIO(data))
     if status != kernel("IFSelect").IFSelect_ReturnStatus.IFSelect_RetDone:

@@ -1,5 +1,6 @@
 // The body of the design under the pointer, all at one scale.
 import { Figure } from "draft/figure";
+import { unpack } from "draft/packed";
 import { View } from "draft/view";
 
 const place = /** @type {HTMLElement} */ (document.getElementById("robot"));
@@ -8,8 +9,7 @@ class Robot {
   /** @param {any} bodies record of `draft.learn.measuring.surface_page` */
   constructor({ geoms, names, rows }) {
     this.names = names;
-    this.rows = rows.map((/** @type {any} */ row) =>
-      row && new Float32Array(Uint8Array.from(atob(row.bdata), (c) => c.charCodeAt(0)).buffer));
+    this.rows = rows.map((/** @type {any} */ row) => row && unpack(row));
     const bodies = Math.max(...geoms.geom_bodyid) + 1;
     this.sizes = names.map((/** @type {string} */ name) =>
       name === "xpos" ? 3 * bodies : name === "xquat" ? 4 * bodies : geoms[name].length);

@@ -116,7 +116,10 @@ def closed(triangles: Array, name: str, file: str) -> Mesh:
             "close it in the program that made it: every edge belongs to two triangles",
         )
     if not len(corners):
-        raise MeshError("the triangles of the mesh have no area", "state its 'unit', or export it")
+        raise MeshError(
+            "the triangles of the mesh have no area",
+            "state its 'unit', or export it with more digits",
+        )
     import trimesh
 
     solid = trimesh.Trimesh(vertices, corners, process=False)
@@ -153,7 +156,7 @@ def welded(triangles: Array) -> tuple[Array, NDArray[np.int64]]:
     if len(triangles) > MAX_TRIANGLES:
         raise MeshError(
             f"a mesh of {len(triangles)} triangles; the limit is {MAX_TRIANGLES}",
-            "export it coarser",
+            "export it with fewer triangles, or a simpler part",
         )
     if not np.abs(triangles).max(initial=0.0) < _FARTHEST:  # Nor is it no number.
         raise MeshError(

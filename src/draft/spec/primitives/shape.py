@@ -16,7 +16,7 @@ from draft.spec.evaluate import Evaluator
 from draft.spec.field_types import Model, Number, NumberVector, broken_rule
 from draft.spec.primitives.base import HIDDEN, Geom, Written
 from draft.spec.primitives.mesh import Mesh
-from draft.values import Value, is_array, some
+from draft.values import Array, Value, is_array, some
 
 _PART = re.compile(
     r"([A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_-]*\.(stl|obj|step|stp)", re.IGNORECASE
@@ -55,8 +55,9 @@ class Shape(Model):
 
     The coordinates in the file are those of the link: its origin is on the axis of its joint, and
     its axes are those of its parent with all joints at zero, turned by `rpy`. Those of an actuator
-    begin in the middle of its solid, with z along its shaft and x along `long`. Copies on the other
-    side of a mirror have the mirrored part; an actuator is turned and not mirrored.
+    begin on its output axis, in the middle of its length along it, with z along its shaft and x
+    along `long`. Copies on the other side of a mirror have the mirrored part; an actuator is turned
+    and not mirrored.
     """
 
     file: PartFile
@@ -201,6 +202,12 @@ class ShapePart(NamedTuple):
             com=g.reflect(self.com, signs),
             axes=g.mirrored(self.axes, signs),
         )
+
+    def inertia(self, mass: Value) -> Array:
+        """Inertia about its centre of mass, axes of the part [kg m2], shape (3, 3)."""
+        x, y, z = (np.square(edge) for edge in self.box)
+        turn = np.eye(3) if self.axes is None else np.array(self.axes, dtype=float)
+        return turn @ np.diag([y + z, x + z, x + y]) @ turn.T * (mass / 12)
 
     def geoms(self, drawn: Geom, at: Vector = g.ZERO, turn: Rotation = None) -> Iterator[Geom]:
         """Geoms of the part in place of a solid: its mesh, its inertia, and what collides.
