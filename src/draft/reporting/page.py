@@ -123,8 +123,11 @@ def _robots(
 ) -> str:
     """Robots of the report: under live physics, recorded, or in their home poses."""
     if live:
+        from draft.browser.page import single_page  # Reports without live physics do not need it.
+
+        inside = escape(single_page(live))
         frame = (
-            f'<iframe class="live" title="Robots" srcdoc="{escape(single_page(live))}"></iframe>'
+            f'<iframe class="live" title="Robots under live physics" srcdoc="{inside}"></iframe>'
         )
         return _section("robots", "Robots", frame, _walks(subjects, controls=False))
     if scene is None:
