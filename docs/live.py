@@ -8,10 +8,17 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import mujoco
+
 import draft
+from draft.browser.page import single_page
+from draft.browser.robots import driven, robot
+from draft.plotting import COLORS
+from draft.validation.arms import by_maker
 
 DOCS = Path(__file__).resolve().parent
 DESCRIPTIONS = DOCS.parent / "examples" / "descriptions"
@@ -47,7 +54,29 @@ def write(out: Path) -> list[Path]:
             imported = draft.import_robot(description, Path(folder) / name)
             designs.append(imported.spec)
         written += draft.page(designs, out / "real.html", single=True)
+    for name in REAL:
+        written.append(out / f"{name}.html")
+        written[-1].write_text(beside_its_maker(name), encoding="utf-8")
     return written
+
+
+def beside_its_maker(name: str) -> str:
+    """Text of a page with a real robot as Draft predicts it, and with the masses of its maker.
+
+    The robot is held out of the trends that predict it.
+    """
+    (description,) = (DESCRIPTIONS / name).glob("*.urdf")
+    twin = draft.compare_twin(description, without=(name,), key=name)
+    made = by_maker(twin).xml
+    theirs = replace(twin.model, xml=made, mujoco=mujoco.MjModel.from_xml_string(made))
+    title = description.stem.title()
+    models = {f"{title}, as predicted": twin.model, f"{title}, maker's masses": theirs}
+    return single_page(
+        [
+            robot(model, words, color, driven([model], "walk", ()))
+            for (words, model), color in zip(models.items(), COLORS, strict=False)
+        ]
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

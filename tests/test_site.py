@@ -203,7 +203,7 @@ def test_the_gallery_states_the_masses_of_real_robots(name: str, tmp_path: Path)
     found = draft.import_robot(description, tmp_path / name)
     own = sum(float(mass) for mass in re.findall(r'<mass value="([^"]+)"', description.read_text()))
     maker, _, model = name.partition("_")
-    row = f"| {MAKERS[maker]} {model.title()} | {found.spec.resolve().mass:.1f} | {own:.1f} |"
+    row = f"{MAKERS[maker]} {model.title()}</a> | {found.spec.resolve().mass:.1f} | {own:.1f} |"
     assert row in (DOCS / "live.md").read_text(encoding="utf-8")
 
 
