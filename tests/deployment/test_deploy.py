@@ -148,7 +148,7 @@ def test_the_velocity_is_an_input_that_the_robot_must_estimate(
     unknown, none = (np.nan,) * 3, (0.0,) * 3
     home = controller.own.numbers["home"]
     controller.step(Seen(0, 0, 0, none, unknown, none, (0, 0, -1), home, np.zeros(12)))
-    assert controller.stop == "a measurement is not finite"
+    assert controller.stop == "a measurement, the command or a target is not finite"
 
 
 def test_a_policy_that_sees_no_velocity_asks_for_none(tmp_path: Path) -> None:

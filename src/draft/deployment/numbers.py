@@ -50,9 +50,11 @@ def numbers(policy: Policy, member: LeggedRobot) -> dict[str, Number]:
         "control_period": Number(policy.control_period, "s", "time between two actions"),
         "timestep": Number(policy.timestep, "s", "time between two torques in training"),
         "timeout": Number(
-            _PERIODS * policy.control_period, "s", "longest time without a measurement or a step"
+            _PERIODS * policy.control_period, "s", "largest time to a measurement or the last step"
         ),
-        "command_timeout": Number(_COMMAND_TIMEOUT, "s", "age at which a command counts as zero"),
+        "command_timeout": Number(
+            _COMMAND_TIMEOUT, "s", "time from a command at which it counts as zero"
+        ),
         "tilt": Number(FALL.tilt, "rad", "tilt of the trunk that stops, a fall in training"),
         "gravity_error": Number(_GRAVITY_ERROR, "1", "largest error of gravity's unit length"),
         "margin": Number(_MARGIN, "rad", "angle beyond its range at which a joint stops"),

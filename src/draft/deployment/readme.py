@@ -168,12 +168,12 @@ _STOP = """\
 The controller stops by damping: kp is 0, kd is `stop_damping`, and the torques stay within the
 lines of the motors. A stop holds until `start` is called. It stops if
 
-- a measurement, the command or an action is not a finite number;
-- `step` is late, or the measurements are older than the time-out;
+- a measurement, the command, a target or an action is not a finite number;
+- `step` is late, or the measurements are older than the time-out, or as far ahead of the clock;
 - the trunk is tilted, or gravity is no unit vector;
 - a joint is beyond its range by the margin, or faster than its speed limit.
 
-A command that is too old counts as zero, and one beyond that of the training as its end. A second
+A command that is too old, or as far ahead of the clock, counts as zero, and one beyond that of the training as its end. A second
 stop must not need this program: a switch that opens the power of the drives."""
 
 
