@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from draft.deployment import observations
-from draft.deployment.header import header
+from draft.deployment.header import sources
 from draft.deployment.numbers import Number, numbers
 from draft.deployment.observations import TERMS
 from draft.deployment.readme import readme
@@ -23,8 +23,8 @@ from draft.learn.policy.reduced import open_any
 from draft.learn.policy.validity import check_drives, fit
 from draft.model.folder import check_target, records, write_folder
 
-_COPIED = ("controller.py", "main.cpp", "CMakeLists.txt")
-_WRITTEN = ("controller.hpp", "policy.npz", "README.md", "design.yaml", "report.json")
+_COPIED = ("controller.py", "CMakeLists.txt")
+_WRITTEN = ("controller.hpp", "main.cpp", "policy.npz", "README.md", "design.yaml", "report.json")
 _LEAST_DELAY = 0.005  # Greatest delay in training below which a policy knows none [s].
 
 
@@ -104,7 +104,7 @@ def deploy(
     here = Path(__file__)
     files: dict[str, str | bytes] = {
         **{name: here.with_name(name).read_text(encoding="utf-8") for name in _COPIED},
-        "controller.hpp": header(table, found.policy),
+        **sources(table, found.policy),
         "policy.npz": _archive(table, found.policy),
         "README.md": readme(found, member, model, table, doubts, folder.resolve().name),
     }

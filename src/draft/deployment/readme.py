@@ -119,8 +119,13 @@ print(out.angle, controller.stop)
 `step` gives targets and gains. Drives with a position controller take them as they are: target
 angle, target speed, kp, kd and the largest torque. Other drives take `torque`, which is called in
 between at the rate of the training or faster. `hold` leads to the home pose, from which the policy
-must start."""
-    more = ",\n                  estimated_base_lin_vel=np.zeros(3)" if estimated else ""
+must start. `torque` checks its targets: call it for both kinds of drives, and while `stop` says
+why, give them `output()`."""
+    indent = " " * 18
+    more = "".join(
+        f",\n{indent}{one}=np.zeros(3)  # PLACEHOLDER: put your estimate here.\n{indent}"
+        for one in estimated
+    )
     text = text.replace("{more}", more).replace("FOLDER", folder)
     for name in estimated:
         text += (
@@ -173,8 +178,9 @@ lines of the motors. A stop holds until `start` is called. It stops if
 - the trunk is tilted, or gravity is no unit vector;
 - a joint is beyond its range by the margin, or faster than its speed limit.
 
-A command that is too old, or as far ahead of the clock, counts as zero, and one beyond that of the training as its end. A second
-stop must not need this program: a switch that opens the power of the drives."""
+A command that is too old, or as far ahead of the clock, counts as zero, and one beyond that of the
+training as its end. A second stop must not need this program: a switch that opens the power of the
+drives."""
 
 
 def _limits(numbers: Mapping[str, Number]) -> Iterator[str]:
