@@ -124,16 +124,15 @@ def test_its_example_compiles_without_a_warning_and_stands(
 
 
 @needs_compiler
-def test_its_header_refuses_options_that_would_hide_what_is_not_finite(written: Written) -> None:
-    words = [
-        "-std=c++17",
-        "-ffast-math",
-        "-fsyntax-only",
-        str(written("cheetah", "run") / "main.cpp"),
-    ]
+@pytest.mark.parametrize("option", ["-ffast-math", "-ffinite-math-only"])
+def test_its_header_refuses_options_that_would_hide_what_is_not_finite(
+    option: str, written: Written
+) -> None:
+    source = str(written("cheetah", "run") / "main.cpp")
+    words = ["-std=c++17", option, "-fsyntax-only", source]
     done = subprocess.run([str(COMPILER), *words], capture_output=True, text=True, check=False)
     assert done.returncode != 0
-    assert "without -ffast-math" in done.stderr
+    assert "without -ffast-math and -ffinite-math-only" in done.stderr
 
 
 def test_the_velocity_is_an_input_that_the_robot_must_estimate(
@@ -303,6 +302,7 @@ def test_words_that_name_no_robot_or_policy_are_refused(tmp_path: Path, command:
     other.write_bytes(other.read_bytes().replace(b"quadruped:cheetah", b"quadruped:leopard"))
     said = command.refuses("deploy", other, "--out", out)
     assert "trained with quadruped:leopard, which is no robot that is known here" in said
+    assert "'quadruped' has no design 'leopard'" in said
     with pytest.raises(RefusedError):
         deploy(draft.load("quadruped").resolve({"actuators.leg.peak_torque": 5}), out)
     with pytest.raises(DraftError, match="there is no skill 'fly'"):

@@ -66,7 +66,9 @@ def numbers(policy: Policy, member: LeggedRobot) -> dict[str, Number]:
         "home": Number(policy.home, "rad", "home pose"),
         "low": Number(low, "rad", "lower end of the range"),
         "high": Number(high, "rad", "upper end of the range"),
-        "action_scale": Number(policy.action_scale, "rad", "offset per unit of action"),
+        "action_scale": Number(
+            policy.action_scale, "rad, rad/s of a wheel", "offset per unit of action"
+        ),
         "stiffness": Number(policy.stiffness, "N m/rad", "gain kp"),
         "damping": Number(policy.damping, "N m s/rad", "gain kd"),
         "stop_damping": Number(policy.damping, "N m s/rad", "gain kd of a stop"),

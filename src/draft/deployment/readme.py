@@ -164,9 +164,14 @@ def _joint_numbers(numbers: Mapping[str, Number]) -> Iterator[str]:
     heads = [f"{word} [{numbers[key].unit}]" for key, word in _OF_JOINTS.items()]
     yield f"| joint | {' | '.join(heads)} |"
     yield "|---|" + "---|" * len(heads)
-    columns = [np.asarray(numbers[key].value) for key in _OF_JOINTS]
+    columns = {key: np.asarray(numbers[key].value) for key in _OF_JOINTS}
+    rolls = np.asarray(numbers["rolls"].value)
     for i, name in enumerate(names):
-        yield f"| `{name}` | {' | '.join(f'{column[i]:.4g}' for column in columns)} |"
+        texts = (  # Nothing checks the angle of a wheel.
+            "-" if rolls[i] and key in ("low", "high") else f"{column[i]:.4g}"
+            for key, column in columns.items()
+        )
+        yield f"| `{name}` | {' | '.join(texts)} |"
 
 
 _STOP = """\
