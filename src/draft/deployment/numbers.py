@@ -50,10 +50,12 @@ def numbers(policy: Policy, member: LeggedRobot) -> dict[str, Number]:
         "control_period": Number(policy.control_period, "s", "time between two actions"),
         "timestep": Number(policy.timestep, "s", "time between two torques in training"),
         "timeout": Number(
-            _PERIODS * policy.control_period, "s", "largest time to a measurement or the last step"
+            _PERIODS * policy.control_period,
+            "s",
+            "longest time since, or until, a measurement or the last step",
         ),
         "command_timeout": Number(
-            _COMMAND_TIMEOUT, "s", "time from a command at which it counts as zero"
+            _COMMAND_TIMEOUT, "s", "time since, or until, a command at which it counts as zero"
         ),
         "tilt": Number(FALL.tilt, "rad", "tilt of the trunk that stops, a fall in training"),
         "gravity_error": Number(_GRAVITY_ERROR, "1", "largest error of gravity's unit length"),

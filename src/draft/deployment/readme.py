@@ -119,8 +119,8 @@ print(out.angle, controller.stop)
 `step` gives targets and gains. Drives with a position controller take them as they are: target
 angle, target speed, kp, kd and the largest torque. Other drives take `torque`, which is called in
 between at the rate of the training or faster. `hold` leads to the home pose, from which the policy
-must start. `torque` checks its targets: call it for both kinds of drives, and while `stop` says
-why, give them `output()`."""
+must start. `torque` checks its targets: call it for both kinds of drives, and once `stop` names a
+reason, give them `output()`."""
     indent = " " * 18
     more = "".join(
         f",\n{indent}{one}=np.zeros(3)  # PLACEHOLDER: put your estimate here.\n{indent}"
