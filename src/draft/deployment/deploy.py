@@ -90,10 +90,7 @@ def deploy(
         shipped.check_skill(skill)
         if own:
             raise DraftError("`skill` is for the policies that ship", "omit `skill`, or `policy`")
-    # Whoever runs the controller in Python leaves its bytecode.
-    bytecode = {path.relative_to(folder).as_posix() for path in folder.glob("__pycache__/*.pyc")}
-    known = {*_COPIED, *_WRITTEN, "__pycache__", *bytecode}
-    check_target(folder, known, "controller")
+    check_target(folder, {*_COPIED, *_WRITTEN}, "controller")
     model = open_design(design).build()
     check_drives(own, model)
     found = fit(model, skill or "walk", own)
