@@ -19,7 +19,7 @@ BUDGET = {
     "assistant": 620,
     "browser": 1_290,  # The designer of a page, its server, Python in a worker and a thin MuJoCo.
     "cli": 6_030,  # `--live` and `--python` of pages, and `deploy`.
-    "deployment": 900,  # Controllers of a policy in C++ and Python.
+    "deployment": 921,  # Controllers of a policy in C++ and Python, which stop on bad targets.
     "description": 2_330,
     "design": 6_655,  # Parts in place of drawn solids: masses, frames, report.
     "drawing": 70,

@@ -224,7 +224,17 @@ def test_wheels_are_driven_to_speeds_and_their_angles_are_not_seen(tmp_path: Pat
     np.testing.assert_allclose(
         controller.torque(angle, np.ones(16), 0.0), policy.torque(step.action, angle, np.ones(16))
     )
-    assert "| a speed |" in (found.folder / "README.md").read_text(encoding="utf-8")
+    text = (found.folder / "README.md").read_text(encoding="utf-8")
+    assert "| a speed |" in text
+    # Nothing checks the angle of a wheel, and its action is a speed.
+    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| `")]
+    table = {row[0][3:-1]: row[2:5] for row in rows if len(row) > 8}
+    assert len(table) == 16
+    for i, name in enumerate(controller.own.names):
+        low, high, scale = table[name]
+        assert (low == high == "-") == bool(policy.rolls[i])
+        assert float(scale) == pytest.approx(policy.action_scale[i], rel=1e-3)
+    assert "| action scale [rad, rad/s of a wheel] |" in text
 
 
 def test_gravity_of_an_orientation_is_that_of_mujoco(controller: Deployed) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -22,7 +23,7 @@ from draft.learn.policy.validity import fit
 from draft.learn.policy.walk import Walk
 from tests.commands import Command
 from tests.deployment.conftest import Written
-from tests.deployment.controllers import COMPILER, Compiled, Python, Seen, needs_compiler
+from tests.deployment.controllers import COMPILER, Compiled, Python, Seen, module, needs_compiler
 from tests.deployment.machine import Machine
 from tests.deployment.made_policies import SEEN, policy_file
 
@@ -123,16 +124,15 @@ def test_its_example_compiles_without_a_warning_and_stands(
 
 
 @needs_compiler
-def test_its_header_refuses_options_that_would_hide_what_is_not_finite(written: Written) -> None:
-    words = [
-        "-std=c++17",
-        "-ffast-math",
-        "-fsyntax-only",
-        str(written("cheetah", "run") / "main.cpp"),
-    ]
+@pytest.mark.parametrize("option", ["-ffast-math", "-ffinite-math-only"])
+def test_its_header_refuses_options_that_would_hide_what_is_not_finite(
+    option: str, written: Written
+) -> None:
+    source = str(written("cheetah", "run") / "main.cpp")
+    words = ["-std=c++17", option, "-fsyntax-only", source]
     done = subprocess.run([str(COMPILER), *words], capture_output=True, text=True, check=False)
     assert done.returncode != 0
-    assert "without -ffast-math" in done.stderr
+    assert "without -ffast-math and -ffinite-math-only" in done.stderr
 
 
 def test_the_velocity_is_an_input_that_the_robot_must_estimate(
@@ -143,12 +143,88 @@ def test_the_velocity_is_an_input_that_the_robot_must_estimate(
     text = readme(tmp_path / "walk")
     assert "**`estimated_base_lin_vel` is an input that no sensor gives" in text
     assert "Vector estimated_base_lin_vel" in (tmp_path / "walk/controller.hpp").read_text()
-    # Without an estimate, the controller stops rather than guess.
-    controller = Python(tmp_path / "walk")
-    unknown, none = (np.nan,) * 3, (0.0,) * 3
-    home = controller.own.numbers["home"]
-    controller.step(Seen(0, 0, 0, none, unknown, none, (0, 0, -1), home, np.zeros(12)))
-    assert controller.stop == "a measurement is not finite"
+    assert "# PLACEHOLDER" in text
+    assert "// PLACEHOLDER" in (tmp_path / "walk/main.cpp").read_text()
+
+
+NO_ESTIMATE = """
+#include "controller.hpp"
+#include <cstdio>
+int main() {
+  draft_policy::Controller controller;
+  draft_policy::Sensors sensors;
+  sensors.projected_gravity = {0, 0, -1};
+  sensors.joint_pos = draft_policy::HOME;
+  controller.start(0);
+  controller.step(sensors, {}, 0);
+  std::puts(text(controller.stop()));
+}
+"""
+
+
+@pytest.mark.parametrize("language", ["python", pytest.param("c++", marks=needs_compiler)])
+def test_it_stops_if_the_velocity_is_not_stated(
+    language: str, written: Written, tmp_path: Path
+) -> None:
+    folder = written("cheetah", "run")
+    if language == "python":
+        made = module(folder)
+        own, none = made.Controller(), np.zeros(3)
+        level, home = (0, 0, -1), own.numbers["home"]
+        own.step(made.Sensors(0, none, level, home, np.zeros(12)), made.Command(0, none), 0)
+        stop = own.stop
+    else:
+        stop = ran(NO_ESTIMATE, folder, tmp_path).strip()
+    assert stop == "a measurement, the command or a target is not finite"
+
+
+# The example with a robot that misses an angle once, and prints what its drives get.
+MISSES = {
+    "sensors.joint_pos = policy::HOME;": """
+    sensors.joint_pos = policy::HOME;
+    static int count = 0;
+    if (++count == std::atoi(std::getenv("MISSED"))) sensors.joint_pos[0] = std::nan("");""",
+    "void write(const policy::Output&, const policy::Joints& torque) {": """
+  void write(const policy::Output& out, const policy::Joints& torque) {
+    std::printf("%g %g %g\\n", out.angle[0], out.stiffness[0], torque[0]);""",
+    "rising = 2.0;": "rising = 0.2;",
+}
+
+
+@needs_compiler
+@pytest.mark.parametrize("missed", [1, 10])
+def test_a_stop_on_the_way_to_the_home_pose_holds(
+    missed: int, written: Written, tmp_path: Path
+) -> None:
+    folder = written("cheetah", "run")
+    code = (folder / "main.cpp").read_text(encoding="utf-8")
+    for here, other in MISSES.items():
+        assert code.count(here) == 1
+        code = code.replace(here, other)
+    said = ran(code, folder, tmp_path, "0.1", MISSED=str(missed))
+    assert "stop: " in said  # A machine that is busy may be late before.
+    given = np.array([line.split() for line in re.findall(r"^\S+ \S+ \S+$", said, re.M)], float)
+    assert np.isfinite(given).all()
+    stiff = given[:, 1] > 0
+    assert not stiff[int(stiff.argmin()) :].any()
+    assert stiff.sum() < missed
+    assert len(stiff) > missed
+
+
+def ran(code: str, folder: Path, place: Path, *words: str, **environment: str) -> str:
+    """What a program of C++ with the header of a controller says."""
+    source, program = place / "own.cpp", place / "own"
+    source.write_text(code, encoding="utf-8")
+    options = ["-std=c++17", f"-I{folder}", "-o", str(program), str(source)]
+    subprocess.run([str(COMPILER), *options], check=True)
+    done = subprocess.run(
+        [str(program), *words],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.stdout
 
 
 def test_a_policy_that_sees_no_velocity_asks_for_none(tmp_path: Path) -> None:
@@ -226,6 +302,7 @@ def test_words_that_name_no_robot_or_policy_are_refused(tmp_path: Path, command:
     other.write_bytes(other.read_bytes().replace(b"quadruped:cheetah", b"quadruped:leopard"))
     said = command.refuses("deploy", other, "--out", out)
     assert "trained with quadruped:leopard, which is no robot that is known here" in said
+    assert "'quadruped' has no design 'leopard'" in said
     with pytest.raises(RefusedError):
         deploy(draft.load("quadruped").resolve({"actuators.leg.peak_torque": 5}), out)
     with pytest.raises(DraftError, match="there is no skill 'fly'"):

@@ -27,18 +27,24 @@ def at(array: np.ndarray, joint: int, value: float) -> np.ndarray:
     return np.where(np.arange(len(array)) == joint, value, array)
 
 
+NOT_FINITE = "a measurement, the command or a target is not finite"
+OLD = "the measurements are old, or ahead of the clock"
+LATE = "the controller is late, or its clock went back"
 STILL, HOME = np.zeros(12), POLICY.home
 TILTED = (np.sin(1.05), 0.0, -np.cos(1.05))
 WRONG: Mapping[str, tuple[dict[str, Any], str]] = {
-    "nan angle": ({"angle": at(HOME, 4, np.nan)}, "a measurement is not finite"),
-    "infinite speed": ({"speed": at(STILL, 0, -np.inf)}, "a measurement is not finite"),
-    "nan gyro": ({"turning": (0.0, np.nan, 0.0)}, "a measurement is not finite"),
-    "nan gravity": ({"gravity": (0.0, 0.0, np.nan)}, "a measurement is not finite"),
-    "nan velocity": ({"velocity": (np.nan, 0.0, 0.0)}, "a measurement is not finite"),
-    "nan command": ({"command": (np.nan, 0.0, 0.0)}, "a measurement is not finite"),
-    "nan time": ({"time": np.nan}, "a measurement is not finite"),
-    "old": ({"time": -2.1 * PERIOD}, "the measurements are old"),
-    "late": ({"now": 2.1 * PERIOD, "time": 2.1 * PERIOD}, "the controller is late"),
+    "nan angle": ({"angle": at(HOME, 4, np.nan)}, NOT_FINITE),
+    "infinite speed": ({"speed": at(STILL, 0, -np.inf)}, NOT_FINITE),
+    "nan gyro": ({"turning": (0.0, np.nan, 0.0)}, NOT_FINITE),
+    "nan gravity": ({"gravity": (0.0, 0.0, np.nan)}, NOT_FINITE),
+    "nan velocity": ({"velocity": (np.nan, 0.0, 0.0)}, NOT_FINITE),
+    "nan command": ({"command": (np.nan, 0.0, 0.0)}, NOT_FINITE),
+    "nan time": ({"time": np.nan}, NOT_FINITE),
+    "old": ({"time": -2.1 * PERIOD}, OLD),
+    "ahead": ({"time": 2.1 * PERIOD}, OLD),
+    "ahead without end": ({"time": 1e9}, OLD),
+    "late": ({"now": 2.1 * PERIOD, "time": 2.1 * PERIOD}, LATE),
+    "a clock that went back": ({"now": -2.1 * PERIOD, "time": -2.1 * PERIOD}, LATE),
     "in m/s2": ({"gravity": (0.0, 0.0, -9.81)}, "gravity is no unit vector"),
     "none": ({"gravity": (0.0, 0.0, 0.0)}, "gravity is no unit vector"),
     "tilted": ({"gravity": TILTED}, "the trunk is tilted"),
@@ -49,6 +55,7 @@ WRONG: Mapping[str, tuple[dict[str, Any], str]] = {
 }
 RIGHT: Mapping[str, dict[str, Any]] = {
     "a period old": {"time": -PERIOD},
+    "measured after the clock was read": {"time": 0.1 * PERIOD},
     "a step later": {"now": 1.9 * PERIOD, "time": 1.9 * PERIOD},
     "inclined": {"gravity": (np.sin(0.95), 0.0, -np.cos(0.95))},
     "at the end of its range": {"angle": at(HOME, 0, 0.85)},
@@ -106,10 +113,27 @@ def test_torques_are_damping_if_nobody_calls_step(controller: Deployed) -> None:
     assert (pushed < 0).any()
     assert controller.stop == ""
     np.testing.assert_array_equal(controller.torque(HOME + 0.2, STILL, 2.1 * PERIOD), STILL)
-    assert controller.stop == "the controller is late"
+    assert controller.stop == LATE
     # A step comes too late.
     controller.step(seen(2.2 * PERIOD))
-    assert controller.stop == "the controller is late"
+    assert controller.stop == LATE
+
+
+def test_torques_are_damping_if_the_clock_went_back(controller: Deployed) -> None:
+    controller.start(0.0)
+    controller.step(seen())
+    np.testing.assert_array_equal(controller.torque(HOME + 0.2, STILL, -2.1 * PERIOD), STILL)
+    assert controller.stop == LATE
+
+
+@pytest.mark.parametrize("angle", [np.nan, np.inf, -np.inf, 1e308])
+def test_a_target_that_is_not_finite_stops_it(angle: float, controller: Deployed) -> None:
+    controller.start(0.0)
+    controller.hold(at(HOME, 4, angle), 0.0)
+    moving = np.linspace(-3.0, 3.0, 12)
+    torque = controller.torque(HOME, moving, 0.0)
+    assert controller.stop == NOT_FINITE
+    np.testing.assert_allclose(torque, -moving * POLICY.damping)
 
 
 def test_a_joint_that_is_not_measured_has_no_torque_and_the_others_are_damped(
@@ -119,7 +143,7 @@ def test_a_joint_that_is_not_measured_has_no_torque_and_the_others_are_damped(
     controller.step(seen())
     speed = at(np.full(12, 2.0), 3, np.nan)
     torque = controller.torque(HOME, speed, 0.0)
-    assert controller.stop == "a measurement is not finite"
+    assert controller.stop == NOT_FINITE
     assert torque[3] == 0.0
     np.testing.assert_allclose(np.delete(torque, 3), np.delete(-2.0 * POLICY.damping, 3))
 
@@ -135,6 +159,8 @@ def test_an_old_command_counts_as_zero_and_one_beyond_the_training_as_its_end(
 
     assert commanded(command=(0.5, 0.1, -0.1)) == pytest.approx([0.5, 0.1, -0.1])
     assert commanded(command=(0.5, 0.1, -0.1), asked=0.4) == [0.0, 0.0, 0.0]
+    assert commanded(command=(0.5, 0.1, -0.1), asked=1.6) == [0.0, 0.0, 0.0]  # Ahead.
+    assert commanded(command=(0.5, 0.1, -0.1), asked=1.4) == pytest.approx([0.5, 0.1, -0.1])
     assert commanded(command=(99, -99, 99)) == pytest.approx([5.0, -0.4, 0.4])
     assert POLICY.commands == pytest.approx((5.0, 0.4, 0.4))
 

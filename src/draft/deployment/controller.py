@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+_NOT_FINITE = "a measurement, the command or a target is not finite"
+_LATE = "the controller is late, or its clock went back"
 
 
 @dataclass
@@ -107,8 +109,8 @@ class Controller:
 
         Args:
             sensors: measurements.
-            command: a command that is too old counts as zero, one beyond that of the training as
-                its end.
+            command: a command that is too old, or ahead of the clock, counts as zero, one beyond
+                that of the training as its end.
             now: time of a clock that never goes back [s].
         """
         n = self.numbers
@@ -116,7 +118,7 @@ class Controller:
         self._last = now
         if not self.stop:
             asked = np.asarray(command.velocity, float)
-            if now - command.time > n["command_timeout"]:
+            if not abs(now - command.time) <= n["command_timeout"]:
                 asked = np.zeros(3)
             self.observation = self._observe(sensors, np.clip(asked, -n["command"], n["command"]))
             self._first = False
@@ -147,25 +149,26 @@ class Controller:
         """Torques at the joints [N m] between two steps, within the lines of the motors.
 
         For drives without a controller of their own: call it at least every `timestep`. It stops
-        if `step` was not called in time; a joint whose angle or speed is not finite gets none.
+        if `step` was not called in time, or a target, an angle or a speed is not finite; the joint
+        of that angle or speed gets none.
         """
         n = self.numbers
         q, dq = np.asarray(angle, float), np.asarray(speed, float)
-        sound = np.isfinite(q) & np.isfinite(dq)
-        if not self.stop and not now - self._last <= n["timeout"]:
-            self.stop = "the controller is late"
-        if not self.stop and not sound.all():
-            self.stop = "a measurement is not finite"
-        if self.stop:
-            out = self.output()
-        q, dq = np.where(sound, q, 0.0), np.where(sound, dq, 0.0)
-        wanted = out.stiffness * (out.angle - q) + out.damping * (out.speed - dq)
+        if not self.stop and not abs(now - self._last) <= n["timeout"]:
+            self.stop = _LATE
+        wanted = _drive(self.output() if self.stop else out, q, dq)
+        if not np.isfinite(wanted).all():
+            self.stop = self.stop or _NOT_FINITE
+            wanted = _drive(self.output(), q, dq)
+        finite = np.isfinite(wanted)
+        dq = np.where(finite, dq, 0.0)
         # The torque of a motor falls with its speed; beyond the no-load speed it brakes.
         peak, stall = n["peak_torque"], n["stall_torque"]
         ends = 1.0 + peak / stall
         share = np.clip(dq / n["no_load_speed"], -ends, ends)
         least, most = stall * (-1.0 - share), stall * (1.0 - share)
-        return sound * np.clip(wanted, np.maximum(-peak, least), np.minimum(peak, most))
+        least, most = np.maximum(-peak, least), np.minimum(peak, most)
+        return np.clip(np.where(finite, wanted, 0.0), least, most)
 
     def network(self, observation: NDArray[np.float32]) -> Array:
         """Action of an observation, in double precision."""
@@ -214,11 +217,11 @@ class Controller:
         if "base_lin_vel" in self.terms:
             measured.append(sensors.estimated_base_lin_vel)
         if not all(np.isfinite(one).all() for one in measured):
-            return "a measurement is not finite"
-        if now - self._last > n["timeout"]:
-            return "the controller is late"
-        if now - sensors.time > n["timeout"]:
-            return "the measurements are old"
+            return _NOT_FINITE
+        if abs(now - self._last) > n["timeout"]:
+            return _LATE
+        if abs(now - sensors.time) > n["timeout"]:
+            return "the measurements are old, or ahead of the clock"
         length = float(np.linalg.norm(down))
         if abs(length - 1.0) > n["gravity_error"]:
             return "gravity is no unit vector"
@@ -230,6 +233,12 @@ class Controller:
         if (np.abs(dq) > n["speed_limit"]).any():
             return "a joint is too fast"
         return ""
+
+
+def _drive(out: Output, angle: Array, speed: Array) -> Array:
+    """Torques of targets and gains, not finite where one of them or a measurement is not."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return out.stiffness * (out.angle - angle) + out.damping * (out.speed - speed)
 
 
 def gravity(quaternion: ArrayLike) -> Array:

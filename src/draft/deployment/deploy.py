@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from draft.deployment import observations
-from draft.deployment.header import header
+from draft.deployment.header import sources
 from draft.deployment.numbers import Number, numbers
 from draft.deployment.observations import TERMS
 from draft.deployment.readme import readme
@@ -19,12 +19,12 @@ from draft.errors import DraftError
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.policy import policy as shipped
 from draft.learn.policy.policy import Policy
-from draft.learn.policy.reduced import open_any
+from draft.learn.policy.reduced import AnyPolicy, open_any
 from draft.learn.policy.validity import check_drives, fit
 from draft.model.folder import check_target, records, write_folder
 
-_COPIED = ("controller.py", "main.cpp", "CMakeLists.txt")
-_WRITTEN = ("controller.hpp", "policy.npz", "README.md", "design.yaml", "report.json")
+_COPIED = ("controller.py", "CMakeLists.txt")
+_WRITTEN = ("controller.hpp", "main.cpp", "policy.npz", "README.md", "design.yaml", "report.json")
 _LEAST_DELAY = 0.005  # Greatest delay in training below which a policy knows none [s].
 
 
@@ -79,21 +79,19 @@ def deploy(
             cannot be written.
     """
     folder = Path(out)
+    own = [] if policy is None else [open_any(policy)]
     if isinstance(design, (str, Path)) and Path(design).suffix == ".onnx":
-        if policy is not None:
+        if own:
             cause = f"'{design}' is a policy, and `policy` names another one"
             raise DraftError(cause, "name the robot, or omit `policy`")
-        policy, design = design, _robot_of(Path(design))
+        own = [open_any(design)]
+        design = _robot_of(own[0])
     if skill is not None:
         shipped.check_skill(skill)
-        if policy is not None:
+        if own:
             raise DraftError("`skill` is for the policies that ship", "omit `skill`, or `policy`")
-    # Whoever runs the controller in Python leaves its bytecode.
-    bytecode = {path.relative_to(folder).as_posix() for path in folder.glob("__pycache__/*.pyc")}
-    known = {*_COPIED, *_WRITTEN, "__pycache__", *bytecode}
-    check_target(folder, known, "controller")
+    check_target(folder, {*_COPIED, *_WRITTEN}, "controller")
     model = open_design(design).build()
-    own = [] if policy is None else [open_any(policy)]
     check_drives(own, model)
     found = fit(model, skill or "walk", own)
     terms = [name for name, _ in found.policy.terms]
@@ -104,7 +102,7 @@ def deploy(
     here = Path(__file__)
     files: dict[str, str | bytes] = {
         **{name: here.with_name(name).read_text(encoding="utf-8") for name in _COPIED},
-        "controller.hpp": header(table, found.policy),
+        **sources(table, found.policy),
         "policy.npz": _archive(table, found.policy),
         "README.md": readme(found, member, model, table, doubts, folder.resolve().name),
     }
@@ -113,23 +111,26 @@ def deploy(
     return Deployed(folder, model.design.reference, found.policy, estimated, tuple(doubts))
 
 
-def _robot_of(file: Path) -> str:
+def _robot_of(policy: AnyPolicy) -> str:
     """Name of the robot that a policy was trained with.
 
     Raises:
-        DraftError: the file is no policy, or its robot is not known by name.
+        DraftError: it was trained with none, or with one that is not known by name.
     """
-    found = open_any(file)
-    if isinstance(found, Policy):
+    if isinstance(policy, Policy):
         try:
-            open_design(found.design)
-        except DraftError:
-            cause = f"{file} was trained with {found.design}, which is no robot that is known here"
+            open_design(policy.design)
+        except DraftError as error:
+            cause = (
+                f"{policy.file} was trained with {policy.design}, which is no robot that is known "
+                f"here: {error.problems[0].cause}"
+            )
         else:
-            return found.design
+            return policy.design
     else:
-        cause = f"{file} is a policy of all legs"
-    raise DraftError(cause, f"name the robot: `draft.deploy(ROBOT, policy={str(file)!r})`")
+        cause = f"{policy.file} is a policy of all legs"
+    remedy = f"name the robot: `draft.deploy(ROBOT, policy={str(policy.file)!r})`"
+    raise DraftError(cause, remedy)
 
 
 def _doubts(policy: Policy, outside: str) -> list[str]:

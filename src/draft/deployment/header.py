@@ -1,4 +1,4 @@
-"""The header of a controller in C++: its numbers, and the code that is the same for all."""
+"""Sources of a controller in C++: its numbers, and the code that is the same for all."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from draft.learn.policy.policy import Policy
 _PER_LINE = 12
 
 
-def header(numbers: Mapping[str, Number], policy: Policy) -> str:
-    """Text of `controller.hpp`.
+def sources(numbers: Mapping[str, Number], policy: Policy) -> dict[str, str]:
+    """Texts of `controller.hpp` and `main.cpp` by name.
 
     Args:
         numbers: numbers of the controller.
@@ -28,14 +28,21 @@ def header(numbers: Mapping[str, Number], policy: Policy) -> str:
         "NUMBERS": "\n".join(_constants(numbers)),
         "LAYERS": "\n".join(_layers(numbers)),
         "ESTIMATES": "".join(
-            f"  Vector {one}{{}};  // No sensor gives it: yours to estimate; see README.md.\n"
+            f"  Vector {one}{{NAN, NAN, NAN}};  // No sensor gives it: see README.md.\n"
             for one in estimates
         ),
         "ESTIMATED_FINITE": "".join(f" ||\n        !detail::finite(s.{x})" for x in estimates),
+        "PLACEHOLDERS": "".join(
+            f"    sensors.{one} = {{0, 0, 0}};  // PLACEHOLDER: put your estimate here.\n"
+            for one in estimates
+        ),
         "OBSERVE": "\n".join(_observed(policy)),
     }
-    text = Path(__file__).with_name("controller.hpp.in").read_text(encoding="utf-8")
-    return re.sub("@([A-Z_]+)@", lambda found: words[found[1]], text)
+    found = {}
+    for name in ("controller.hpp", "main.cpp"):
+        text = Path(__file__).with_name(f"{name}.in").read_text(encoding="utf-8")
+        found[name] = re.sub("@([A-Z_]+)@", lambda match: words[match[1]], text)
+    return found
 
 
 def _observed(policy: Policy) -> Iterator[str]:

@@ -50,9 +50,13 @@ def numbers(policy: Policy, member: LeggedRobot) -> dict[str, Number]:
         "control_period": Number(policy.control_period, "s", "time between two actions"),
         "timestep": Number(policy.timestep, "s", "time between two torques in training"),
         "timeout": Number(
-            _PERIODS * policy.control_period, "s", "longest time without a measurement or a step"
+            _PERIODS * policy.control_period,
+            "s",
+            "longest time since, or until, a measurement or the last step",
         ),
-        "command_timeout": Number(_COMMAND_TIMEOUT, "s", "age at which a command counts as zero"),
+        "command_timeout": Number(
+            _COMMAND_TIMEOUT, "s", "time since, or until, a command at which it counts as zero"
+        ),
         "tilt": Number(FALL.tilt, "rad", "tilt of the trunk that stops, a fall in training"),
         "gravity_error": Number(_GRAVITY_ERROR, "1", "largest error of gravity's unit length"),
         "margin": Number(_MARGIN, "rad", "angle beyond its range at which a joint stops"),
@@ -64,7 +68,9 @@ def numbers(policy: Policy, member: LeggedRobot) -> dict[str, Number]:
         "home": Number(policy.home, "rad", "home pose"),
         "low": Number(low, "rad", "lower end of the range"),
         "high": Number(high, "rad", "upper end of the range"),
-        "action_scale": Number(policy.action_scale, "rad", "offset per unit of action"),
+        "action_scale": Number(
+            policy.action_scale, "rad, rad/s of a wheel", "offset per unit of action"
+        ),
         "stiffness": Number(policy.stiffness, "N m/rad", "gain kp"),
         "damping": Number(policy.damping, "N m s/rad", "gain kd"),
         "stop_damping": Number(policy.damping, "N m s/rad", "gain kd of a stop"),

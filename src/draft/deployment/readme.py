@@ -119,8 +119,13 @@ print(out.angle, controller.stop)
 `step` gives targets and gains. Drives with a position controller take them as they are: target
 angle, target speed, kp, kd and the largest torque. Other drives take `torque`, which is called in
 between at the rate of the training or faster. `hold` leads to the home pose, from which the policy
-must start."""
-    more = ",\n                  estimated_base_lin_vel=np.zeros(3)" if estimated else ""
+must start. `torque` checks its targets: call it for both kinds of drives, and once `stop` names a
+reason, give them `output()`."""
+    indent = " " * 18
+    more = "".join(
+        f",\n{indent}{one}=np.zeros(3)  # PLACEHOLDER: put your estimate here.\n{indent}"
+        for one in estimated
+    )
     text = text.replace("{more}", more).replace("FOLDER", folder)
     for name in estimated:
         text += (
@@ -159,22 +164,28 @@ def _joint_numbers(numbers: Mapping[str, Number]) -> Iterator[str]:
     heads = [f"{word} [{numbers[key].unit}]" for key, word in _OF_JOINTS.items()]
     yield f"| joint | {' | '.join(heads)} |"
     yield "|---|" + "---|" * len(heads)
-    columns = [np.asarray(numbers[key].value) for key in _OF_JOINTS]
+    columns = {key: np.asarray(numbers[key].value) for key in _OF_JOINTS}
+    rolls = np.asarray(numbers["rolls"].value)
     for i, name in enumerate(names):
-        yield f"| `{name}` | {' | '.join(f'{column[i]:.4g}' for column in columns)} |"
+        texts = (  # Nothing checks the angle of a wheel.
+            "-" if rolls[i] and key in ("low", "high") else f"{column[i]:.4g}"
+            for key, column in columns.items()
+        )
+        yield f"| `{name}` | {' | '.join(texts)} |"
 
 
 _STOP = """\
 The controller stops by damping: kp is 0, kd is `stop_damping`, and the torques stay within the
 lines of the motors. A stop holds until `start` is called. It stops if
 
-- a measurement, the command or an action is not a finite number;
-- `step` is late, or the measurements are older than the time-out;
+- a measurement, the command, a target or an action is not a finite number;
+- `step` is late, or the measurements are older than the time-out, or as far ahead of the clock;
 - the trunk is tilted, or gravity is no unit vector;
 - a joint is beyond its range by the margin, or faster than its speed limit.
 
-A command that is too old counts as zero, and one beyond that of the training as its end. A second
-stop must not need this program: a switch that opens the power of the drives."""
+A command that is too old, or as far ahead of the clock, counts as zero, and one beyond that of the
+training as its end. A second stop must not need this program: a switch that opens the power of the
+drives."""
 
 
 def _limits(numbers: Mapping[str, Number]) -> Iterator[str]:
