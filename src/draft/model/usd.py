@@ -8,7 +8,6 @@ Angular numbers of USD are in degrees: ranges, speeds, and gains per degree.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -17,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from draft.errors import DraftError
-from draft.extras import need
+from draft.extras import need, usd_possible
 from draft.model.scene import DAMPING, STIFFNESS
 from draft.model.urdf import DECLARATION, distinct_name, meshes, robot_element
 from draft.values import scalar
@@ -60,7 +59,7 @@ def robot_usda(model: Model) -> str:
 
 def _library(module: str) -> Any:
     """Module of the converter or of OpenUSD, which comes with it."""
-    if find_spec(_CONVERTER) is None and (sys.version_info >= (3, 13) or sys.platform == "darwin"):
+    if not usd_possible() and find_spec(_CONVERTER) is None:
         raise DraftError(
             "USD needs Python 3.11 or 3.12 on Linux or Windows, as its converter does",
             "export `urdf`, and run urdf-usd-converter where there is such a Python",
