@@ -84,6 +84,8 @@ def test_only_a_robot_with_a_fixed_base_is_fixed_to_the_world(
     stage = stage_of(built(name, None), tmp_path / "out")
     bodies = {one.GetPath() for one in stage.Traverse() if one.HasAPI(UsdPhysics.RigidBodyAPI)}
     above = [UsdPhysics.Joint(one).GetBody0Rel().GetTargets() for one in joints_of(stage).values()]
+    (root,) = (one for one in stage.Traverse() if one.HasAPI("NewtonArticulationRootAPI"))
+    assert root.GetAttribute("newton:selfCollisionEnabled").Get() is False
     assert sum(not paths or paths[0] not in bodies for paths in above) == fixed
 
 

@@ -49,6 +49,8 @@ def robot_usda(model: Model) -> str:
         for prim in stage.Traverse():
             if prim.IsInstance():  # Flattening would put what they share outside the robot.
                 prim.SetInstanceable(False)
+            if prim.HasAPI("NewtonArticulationRootAPI"):  # As in the MJCF.
+                prim.GetAttribute("newton:selfCollisionEnabled").Set(False)
         _add_drives(stage, model)
         layer = stage.Flatten(addSourceFileComment=False)
         if model.design.floating:  # The converter fixes every root to the world.
