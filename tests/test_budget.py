@@ -29,7 +29,7 @@ BUDGET = {
     "laws": 2_090,  # The nearest module of the catalogue.
     "learn": 20_415,  # Policies without a velocity: history, encoders, dry friction.
     "metrics": 3_200,
-    "model": 5_530,  # Configurations for mjlab and Isaac Lab, and parts in every format.
+    "model": 5_655,  # USD; configurations for mjlab and Isaac Lab; parts in every format.
     "reporting": 1_610,  # Tables of parts and of masses by origin.
     "serving": 700,  # Files and messages for a page on this machine.
     "spec": 5_945,  # Parts of STL, OBJ and STEP: fields, reading, checks, inertia.

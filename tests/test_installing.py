@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from docs import blocks
+from draft.extras import usd_possible
 from tests.environments import warm
 from tests.warm import Warm
 
@@ -36,6 +37,11 @@ NEEDS = {
     },
     "mcp": {"`mcp`": "mcp ."},
     "cad": {"`export --format step`": "export bear --out e --format step"},
+    **(
+        {"usd": {"`export --format usd`": "export bear --out e --format usd"}}
+        if usd_possible()
+        else {}
+    ),
     "cluster": {"`study --ray`": "study examples/three_quadrupeds.yaml --toy --ray"},
     "robots": {"`import` of robots by name": "import menagerie:unitree_go2 --out i"},
     "learn": {

@@ -95,14 +95,21 @@ def check(module: str, extra: str) -> None:
         raise missing(module, extra)
 
 
+def usd_possible() -> bool:
+    """Whether the library of the extra `usd` has wheels for this Python and system."""
+    return sys.version_info < (3, 13) and sys.platform != "darwin"
+
+
 def required() -> dict[str, list[str]]:
-    """Return the libraries of each extra, without those that not every system needs."""
+    """Return the libraries of each extra, without those not for every or for this system."""
     needed: dict[str, list[str]] = {}
     for line in requires(DISTRIBUTION) or ():
         name = re.match(r"[\w.-]+", line)
-        extra = re.search(r"""; *extra *== *['"]([\w-]+)['"]$""", line)
-        if name is not None and extra is not None:
-            needed.setdefault(extra[1], []).append(name[0])
+        extra = re.search(r"""; *(.* and +)?extra *== *['"]([\w-]+)['"]$""", line)
+        if name is None or extra is None:
+            continue
+        if extra[1] is None or (extra[2] == "usd" and usd_possible()):
+            needed.setdefault(extra[2], []).append(name[0])
     return needed
 
 

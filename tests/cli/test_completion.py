@@ -59,7 +59,7 @@ def offered(completion: Path, *words: str) -> list[str]:
         (("show", "--json", "gi"), ["giraffe"]),
         (("build", "quadruped", "--design", "ch"), ["cheetah"]),
         (("build", "ro"), ["robot"]),
-        (("export", "bear", "--format", "u"), ["urdf"]),
+        (("export", "bear", "--format", "u"), ["urdf", "usd"]),
         (("export", "bear", "--format", "urdf", "m"), ["mjcf", "mjlab"]),
         (("export", "bear", "--out", "some", "m"), []),
         (("train", "cheetah", "--stage", ""), ["base", "velocity", "terrain", "push", "any"]),

@@ -27,7 +27,7 @@ SCREEN = "screen bear --vary thigh_length=0.2:0.3 --out s --n"
         ("import x.urdf --population None", "Expected one of ('humanoid', 'quadruped')."),
         (
             "export bear --format dxf",
-            "Expected one of ('urdf', 'sdf', 'glb', 'mjcf', 'step', 'mjlab', 'isaaclab').",
+            "Expected one of ('urdf', 'sdf', 'glb', 'mjcf', 'step', 'usd', 'mjlab', 'isaaclab').",
         ),
         (
             "learn show --recipe lapto",

@@ -1,12 +1,14 @@
 """All formats are one robot: each is read by a library of its own, and their numbers are compared.
 
-MuJoCo reads MJCF, Pinocchio reads URDF, Drake reads SDFormat. No reader shares code with Draft.
+MuJoCo reads MJCF, Pinocchio reads URDF, Drake reads SDFormat, OpenUSD reads USD. No reader shares
+code with Draft.
 """
 
 # pyright: reportAttributeAccessIssue=false
 # (Compiled modules carry no types.)
 from __future__ import annotations
 
+import importlib.util
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -35,6 +37,9 @@ PARTS = "own parts"
 ROBOTS = [*SHIPPED, (COUPLED, None), (SLIDE, None), (PARTS, None)]
 # Files have ten significant digits; MuJoCo keeps the vertices of a mesh in single precision.
 CLOSE, COARSE = 1e-7, 1e-6
+# Rounding to single precision, as a share. UsdPhysics has it for nearly all numbers, of which only
+# ends of ranges, of up to some radians, need more than the bounds above.
+SINGLE = 2.0**-24
 
 
 @dataclass
@@ -62,6 +67,7 @@ class Joint:
 class Robot:
     bodies: dict[str, Body] = field(default_factory=dict)
     joints: dict[str, Joint] = field(default_factory=dict)
+    rounding: float = 0.0  # Of the ends of ranges, as a share.
 
     def total(self) -> Body:
         """The whole as one body."""
@@ -239,7 +245,92 @@ def by_drake(folder: Path, home: dict[str, float], floating: bool) -> Robot:
     return robot
 
 
-READERS: list[Callable[[Path, dict[str, float], bool], Robot]] = [by_pinocchio, by_drake]
+def pose(place: Any, turn: Any) -> Array:
+    """Homogeneous matrix of a place and a quaternion of OpenUSD."""
+    w, (x, y, z) = turn.GetReal(), turn.GetImaginary()
+    flat = np.empty(9)
+    mujoco.mju_quat2Mat(flat, np.array([w, x, y, z]) / np.linalg.norm([w, x, y, z]))
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = flat.reshape(3, 3), place
+    return matrix
+
+
+def by_usd(folder: Path, home: dict[str, float], floating: bool) -> Robot:
+    """USD as OpenUSD reads it: bodies are placed by their joints alone, angles are in degrees."""
+    pytest.importorskip("pxr.UsdPhysics", reason="the extra `usd` is not installed")
+    from pxr import Usd, UsdPhysics
+
+    stage = Usd.Stage.Open(str(folder / "robot.usda"))
+    prims = [*stage.Traverse()]
+    links = {one.GetPath(): one for one in prims if one.HasAPI(UsdPhysics.RigidBodyAPI)}
+    names = {path: one.GetDisplayName() or one.GetName() for path, one in links.items()}
+    joints = [UsdPhysics.Joint(one) for one in prims if one.IsA(UsdPhysics.Joint)]
+    to = {joint.GetBody1Rel().GetTargets()[0]: joint for joint in joints}
+    assert len(to) == len(joints) == len(links) - floating
+    robot, placed = Robot(rounding=SINGLE), {}
+
+    def name_of(joint: Any) -> str:
+        """Name of a joint; one that has the name of a link has another name here."""
+        name = joint.GetDisplayName() or joint.GetName()
+        own = name.removesuffix("_joint")
+        return own if own in names.values() else name
+
+    def place(path: Any) -> Array:
+        """Pose of a body; what is not one is the world."""
+        if path not in placed:
+            placed[path] = follow(to[path]) if path in to else np.eye(4)
+        return placed[path]
+
+    def follow(joint: Any) -> Array:
+        """Pose of the body behind a joint, which is noted."""
+        prim, (above,) = joint.GetPrim(), joint.GetBody0Rel().GetTargets()
+        frame = place(above) @ pose(joint.GetLocalPos0Attr().Get(), joint.GetLocalRot0Attr().Get())
+        own = pose(joint.GetLocalPos1Attr().Get(), joint.GetLocalRot1Attr().Get())
+        if prim.IsA(UsdPhysics.FixedJoint):
+            return frame @ np.linalg.inv(own)
+        hinge = prim.IsA(UsdPhysics.RevoluteJoint)
+        unit = math.radians(1) if hinge else 1.0
+        typed = (UsdPhysics.RevoluteJoint if hinge else UsdPhysics.PrismaticJoint)(prim)
+        name = name_of(prim)
+        axis = np.eye(3)["XYZ".index(typed.GetAxisAttr().Get())]
+        low, high = typed.GetLowerLimitAttr().Get(), typed.GetUpperLimitAttr().Get()
+        drive = UsdPhysics.DriveAPI.Get(prim, "angular" if hinge else "linear")
+        follows = None
+        if prim.HasAPI("NewtonMimicAPI"):
+            (leader,) = prim.GetRelationship("newton:mimicJoint").GetTargets()
+            ratio, offset = (prim.GetAttribute(f"newton:mimicCoef{i}").Get() for i in (1, 0))
+            follows = (name_of(stage.GetPrimAtPath(leader)), ratio, offset * unit)
+        robot.joints[name] = Joint(
+            frame[:3, :3] @ axis,
+            frame[:3, 3] if hinge else None,
+            (low * unit, high * unit) if np.isfinite(low) else None,
+            drive.GetMaxForceAttr().Get() if drive else 0.0,
+            prim.GetAttribute("newton:velocityLimit").Get() * unit if drive else None,
+            follows,
+        )
+        move, value = np.eye(4), home[name]
+        if hinge:
+            flat, turn = np.empty(9), np.empty(4)
+            mujoco.mju_axisAngle2Quat(turn, axis, value)
+            mujoco.mju_quat2Mat(flat, turn)
+            move[:3, :3] = flat.reshape(3, 3)
+        else:
+            move[:3, 3] = value * axis
+        return frame @ move @ np.linalg.inv(own)
+
+    for path, one in links.items():
+        mass, at = UsdPhysics.MassAPI(one), place(path)
+        turn = at[:3, :3] @ pose((0, 0, 0), mass.GetPrincipalAxesAttr().Get())[:3, :3]
+        robot.bodies[names[path]] = Body(
+            mass.GetMassAttr().Get(),
+            at[:3, 3] + at[:3, :3] @ np.array(mass.GetCenterOfMassAttr().Get()),
+            turn @ np.diag(mass.GetDiagonalInertiaAttr().Get()) @ turn.T,
+        )
+    return robot
+
+
+READERS: list[Callable[[Path, dict[str, float], bool], Robot]] = [by_pinocchio, by_drake, by_usd]
+USD = () if importlib.util.find_spec("pxr") is None else ("usd",)
 
 
 @cache
@@ -258,7 +349,9 @@ def exported(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[draft.Model, Path]:
     model = model_of(*request.param)
-    return model, model.save(tmp_path_factory.mktemp("robot") / "out", ("mjcf", "urdf", "sdf"))
+    return model, model.save(
+        tmp_path_factory.mktemp("robot") / "out", ("mjcf", "urdf", "sdf", *USD)
+    )
 
 
 @pytest.mark.parametrize("read", READERS)
@@ -290,7 +383,9 @@ def test_every_format_is_the_robot_of_the_mjcf(
         assert joint.follows == pytest.approx(expected.follows), name
         assert (joint.range is None) == (expected.range is None), name
         if joint.range is not None:
-            assert joint.range == pytest.approx(expected.range, abs=CLOSE), name
+            span = np.array(expected.range)
+            close = CLOSE + found.rounding * np.abs(span)
+            assert (np.abs(joint.range - span) <= close).all(), name
         assert joint.torque == pytest.approx(expected.torque, rel=CLOSE), name
         if expected.speed is not None:
             assert joint.speed == pytest.approx(expected.speed, rel=CLOSE), name

@@ -47,7 +47,7 @@ def main(
             name="format",
             metavar=f"{{{','.join(EXPORTERS)}}} ...",
             help="urdf with its mesh and actuators.json, glb, mjcf, sdf with its mesh, step with "
-            "bom.csv; mjlab and isaaclab with a Python file that configures the robot there.",
+            "bom.csv, usd; mjlab and isaaclab with a Python file that configures the robot there.",
             help_behavior_hint=f"(default: {' '.join(FORMATS)})",
         ),
     ] = FORMATS,

@@ -25,8 +25,9 @@ def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = 
         formats: "urdf" (robot.urdf, meshes and actuators.json with what URDF cannot
             hold: armature [kg m2], gains [N m/rad, N m s/rad]), "glb" (robot.glb, lengths in m),
             "mjcf" (robot.xml, scene.xml), "sdf" (robot.sdf, model.config, meshes), "step"
-            (robot.step in mm and bom.csv; extra `cad`), "mjlab" (mjlab_robot.py and robot.xml),
-            "isaaclab" (isaaclab_robot.py, robot.urdf and meshes), and those of extensions.
+            (robot.step in mm and bom.csv; extra `cad`), "usd" (robot.usda; extra `usd`), "mjlab"
+            (mjlab_robot.py and robot.xml), "isaaclab" (isaaclab_robot.py, robot.urdf and meshes),
+            and those of extensions.
 
     Returns:
         The folder.
@@ -35,8 +36,8 @@ def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = 
         RefusedError: the design filter found errors.
         ModelError: MuJoCo does not accept the model, or the CAD kernel the trunk.
         DraftError: the design is N designs, a format is unknown, the folder holds files that Draft
-            did not write, or cannot be written, an extra is missing, or an exporter of an extension
-            fails.
+            did not write, or cannot be written, an extra is missing or not for this Python and
+            system, or an exporter of an extension fails.
     """
     model = design.build() if isinstance(design, Design) else design
     return model.save(folder, formats)

@@ -176,6 +176,14 @@ def step(model: Model) -> dict[str, str | bytes]:
     return {"robot.step": robot_step(model), "bom.csv": bom_csv(model.design)}
 
 
+@exporter("robot.usda")
+def usd(model: Model) -> dict[str, str | bytes]:
+    """OpenUSD with physics and drives, for Isaac Sim and Newton; needs the extra `usd`."""
+    from draft.model.usd import robot_usda
+
+    return {"robot.usda": robot_usda(model)}
+
+
 @exporter("mjlab_robot.py", "robot.xml")
 def mjlab(model: Model) -> dict[str, str | bytes]:
     """Python file that configures the robot for mjlab, and its MJCF."""

@@ -44,8 +44,8 @@ def save(
             files are of one design.
         formats: names of `EXPORTERS`: "mjcf" is robot.xml and scene.xml; "urdf" is robot.urdf,
             meshes and actuators.json; "sdf" is robot.sdf, model.config and meshes; "glb" is
-            robot.glb; "step" is robot.step and bom.csv; "mjlab" and "isaaclab" are a Python file
-            with robot.xml, or with robot.urdf and its meshes.
+            robot.glb; "step" is robot.step and bom.csv; "usd" is robot.usda; "mjlab" and "isaaclab"
+            are a Python file with robot.xml, or with robot.urdf and its meshes.
         more: text of further files by name, all of them known.
 
     Returns:

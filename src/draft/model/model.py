@@ -97,8 +97,8 @@ class Model:
 
         Args:
             folder: folder to write.
-            formats: formats to write: "mjcf", "urdf", "sdf", "glb", "step", or those of
-                extensions.
+            formats: formats to write: "mjcf", "urdf", "sdf", "glb", "step", "usd", or
+                those of extensions.
             more: text of further files by name, such as report.html.
 
         Returns:
