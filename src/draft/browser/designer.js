@@ -224,6 +224,7 @@ export class Designer {
   async drop(files) {
     const index = this.shown, last = this.sources[index], names = Object.keys(last.files);
     const given = /** @type {Record<string, string>} */ ({});
+    $("design-open").value = ""; // The same file can be chosen again.
     for (const file of files) {
       // A browser gives no folders: `designs/NAME.yaml` comes as `NAME.yaml`.
       const name = names.find((one) => one.split("/").at(-1) === file.name) ?? file.name;
@@ -236,7 +237,6 @@ export class Designer {
       given[name] = text;
     }
     const waits = this.busy, more = Object.keys(given).some((name) => !names.includes(name));
-    $("design-open").value = "";
     await this.take(given);
     // A file that the robot does not use would be refused with each change that follows.
     if (more && !waits && this.problems[index].length && !this.others.has(index)) this.sources[index] = last;
