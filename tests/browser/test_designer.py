@@ -333,6 +333,13 @@ def test_files_are_edited_and_a_robot_of_ones_own_is_dropped_in(
     tab.set_input_files("#design-open", str(other))
     settle(tab, problems=True)
     assert "a robot has no such file" in tab.inner_text("#design-problems")
+    tab.select_option("#design-file", "root.yaml")
+    tab.click("#design-apply")  # Files that were refused are not asked for again.
+    settle(tab)
+    other.write_bytes(b"\x00\xff")
+    tab.set_input_files("#design-open", str(other))
+    settle(tab, problems=True)
+    assert "it is no text" in tab.inner_text("#design-problems")
     assert tab.faults == []
 
 
@@ -350,6 +357,104 @@ def test_sliders_of_the_page_and_fields_are_of_one_robot(opened: Open) -> None:
     put(tab, "thigh_length", "0.24")
     settle(tab)
     assert float(tab.input_value("[id=thigh_length]")) == 0.24
+    assert tab.faults == []
+
+
+def slide_to_the_end(tab: Any) -> None:
+    tab.locator("[id=thigh_length]").focus()
+    tab.keyboard.press("End")
+
+
+@pytest.mark.slow
+def test_a_slider_that_moves_before_the_answer_counts(opened: Open) -> None:
+    tab = opened("cheetah", vary=("thigh_length=0.22:0.3",))
+    tab.evaluate(
+        """() => {
+          const { designer } = draftPage, ask = designer.ask;
+          designer.ask = async (text) => {
+            await new Promise((take) => { window.go = take; });
+            designer.ask = ask;
+            return ask(text);
+          };
+        }"""
+    )
+    put(tab, "shank_length", "0.26")
+    slide_to_the_end(tab)
+    tab.evaluate("go()")
+    settle(tab)
+    values = {**open_design("cheetah").values, "thigh_length": 0.3, "shank_length": 0.26}
+    assert mass(tab) == pytest.approx(open_design("cheetah").spec.resolve(values).mass, abs=0.005)
+    assert float(tab.input_value("[id=thigh_length]")) == 0.3
+    assert tab.evaluate("draftPage.networks.size") == 1
+    assert tab.faults == []
+
+
+@pytest.mark.slow
+def test_sliders_of_the_page_leave_a_robot_of_other_files(opened: Open) -> None:
+    tab = opened("cheetah", vary=("thigh_length=0.22:0.3",))
+    folder = open_design("biped").spec.folder
+    assert folder is not None
+    tab.click("#design-fields summary")
+    own = [str(folder / f"{name}.yaml") for name in ("parameters", "tree", "root")]
+    tab.set_input_files("#design-open", own)
+    tab.wait_for_function("draftPage.designer.changed[0]")
+    settle(tab)
+    slide_to_the_end(tab)
+    settle(tab)
+    assert tab.inner_text("#sliders output") == "–"
+    assert tab.inner_text("#design-changed") == ""
+    assert tab.inner_text("#name") == "biped"
+    tab.click("#design-back")
+    settle(tab)
+    assert tab.inner_text("#name") == "cheetah"
+    assert tab.inner_text("#sliders output") == "0.25 m"
+    slide_to_the_end(tab)
+    settle(tab)
+    assert tab.inner_text("#sliders output") == "0.300 m"
+    assert tab.inner_text("#design-changed") == "--set thigh_length=0.3"
+    assert tab.faults == []
+
+
+@pytest.mark.slow
+def test_a_field_of_the_first_robot_moves_the_sliders_and_the_others_with_them(
+    opened: Open,
+) -> None:
+    tab = opened("cheetah", "bear", vary=("thigh_length=*0.8:*1.2",))
+    tab.click("#robots button:nth-child(2)")
+    before = mass(tab)
+    assert tab.inner_text("#design-changed") == ""
+    tab.click("#robots button:nth-child(1)")
+    length = open_design("cheetah").parameters["thigh_length"]
+    put(tab, "thigh_length", str(1.2 * float(length)))
+    settle(tab)
+    tab.click("#robots button:nth-child(2)")
+    assert mass(tab) > before
+    assert "thigh_length=" in tab.inner_text("#design-changed")
+    assert tab.evaluate("draftPage.designer.changed") == [True, False]
+    assert tab.faults == []
+
+
+@pytest.mark.slow
+def test_problems_and_texts_stay_with_their_robot(opened: Open) -> None:
+    tab = opened("cheetah", "arm")
+    put(tab, "thigh_length", "3")
+    settle(tab, problems=True)
+    tab.click("#robots button:nth-child(2)")
+    assert tab.locator("#design-problems li").count() == 0
+    put(tab, "upper_arm_length", "0.5")
+    settle(tab)
+    tab.click("#design-fields summary")
+    tab.fill("#design-text", "# not applied")
+    put(tab, "upper_arm_length", "0.51 * 1")
+    settle(tab)
+    assert tab.input_value("#design-text") == "# not applied"
+    assert tab.inner_text("#design-changed") == "--set 'upper_arm_length=0.51 * 1'"
+    tab.click("#robots button:nth-child(1)")
+    assert "outside its range" in tab.inner_text("#design-problems")
+    assert tab.input_value("[data-name=thigh_length]") == "3"
+    tab.evaluate("draftPage.designer.take({'parameters.yaml': '#'.repeat(5e6)})")
+    tab.wait_for_function("document.getElementById('design-problems').innerText.includes('bytes')")
+    assert "4000000 at most" in tab.inner_text("#design-problems")
     assert tab.faults == []
 
 
