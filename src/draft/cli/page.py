@@ -77,9 +77,8 @@ def main(
     """
     start = time.perf_counter()
     if port is not None and not live:
-        raise DraftError("--port is of --live alone", "add --live, or omit --port")
-    place = _PORT if port is None else port
-    check_port(place)
+        raise DraftError("--port needs --live: nothing is served", "add --live, or omit --port")
+    check_port(place := _PORT if port is None else port)
     if live:
         check_free(HOST, place)
     from draft.browser.page import page
