@@ -236,15 +236,20 @@ export class Designer {
       }
       given[name] = text;
     }
-    const waits = this.busy, more = Object.keys(given).some((name) => !names.includes(name));
+    const waits = this.busy, whole = NEEDED.every((name) => name in given);
+    const more = !whole && Object.keys(given).some((name) => !names.includes(name));
     await this.take(given);
     // A file that the robot does not use would be refused with each change that follows.
-    if (more && !waits && this.problems[index].length && !this.others.has(index)) this.sources[index] = last;
+    if (more && !waits && this.problems[index].length) {
+      this.sources[index] = last;
+      this.show(this.shown);
+    }
   }
 
   /** @param {Source} source */
   reset(source) {
     this.sources[this.shown] = source;
+    this.show(this.shown);
     return this.want(this.shown);
   }
 
