@@ -407,7 +407,7 @@ def test_sliders_of_the_page_leave_a_robot_of_other_files(opened: Open) -> None:
     tab.click("#design-back")
     settle(tab)
     assert tab.inner_text("#name") == "cheetah"
-    assert tab.inner_text("#sliders output") == "0.25 m"
+    assert tab.inner_text("#sliders output") == "0.250 m"
     slide_to_the_end(tab)
     settle(tab)
     assert tab.inner_text("#sliders output") == "0.300 m"
