@@ -17,7 +17,7 @@ SOURCE = Path(draft.__file__).parent
 BUDGET = {
     ".": 2_580,  # Reading of STL and OBJ, from `imports`.
     "assistant": 620,
-    "browser": 1_290,  # The designer of a page, its server, Python in a worker and a thin MuJoCo.
+    "browser": 1_306,  # Parts that are no text in the messages of a page, its modules and limits.
     "cli": 6_030,  # `--live` and `--python` of pages, and `deploy`.
     "deployment": 921,  # Controllers of a policy in C++ and Python, which stop on bad targets.
     "description": 2_330,
@@ -31,7 +31,7 @@ BUDGET = {
     "metrics": 3_200,
     "model": 5_655,  # USD; configurations for mjlab and Isaac Lab; parts in every format.
     "reporting": 1_610,  # Tables of parts and of masses by origin.
-    "serving": 700,  # Files and messages for a page on this machine.
+    "serving": 706,  # Files and messages for a page on this machine.
     "spec": 5_945,  # Parts of STL, OBJ and STEP: fields, reading, checks, inertia.
     "studio": 3_160,
     "study": 6_470,

@@ -17,8 +17,10 @@ from draft.browser.designer import Designer, source
 from draft.browser.page import page
 from draft.design.references import open_design
 from draft.errors import DraftError
+from draft.laws.actuators import FILE
 from draft.learn.policy.walk import plane_xml
 from draft.serving.messages import MOST, MessageServer
+from tests.model import own_parts
 
 pytest.importorskip("mjswan", reason="needs the extra page")
 
@@ -27,8 +29,8 @@ Open = Callable[..., Any]
 
 def message(reference: str = "cheetah", **more: Any) -> str:
     own = source(open_design(reference))
-    asked = {"id": 3, "files": own["files"], "values": own["values"], "title": "t", "color": "#000"}
-    return json.dumps(asked | more)
+    asked = {name: own[name] for name in ("files", "binary", "values")}
+    return json.dumps({"id": 3, "title": "t", "color": "#000"} | asked | more)
 
 
 def answer(text: str) -> dict[str, Any]:
@@ -75,6 +77,8 @@ def test_fields_are_all_parameters_and_what_actuators_state() -> None:
         (message(values={"thigh_length": "1 +"}), "thigh_length"),
         (message(files={}), "file not found"),
         (message(files={"../tree.yaml": ""}), "file not found"),
+        (message(binary={"a.stl": "A"}), "the page sent a message that cannot be read: binary.a"),
+        (message(binary={"a.stl": "AAAA"}), "a.stl a robot has no such file"),
         (
             message(files={"parameters.yaml": "a: [", "tree.yaml": ""}),
             "parameters.yaml:2:1 not valid YAML",
@@ -86,13 +90,30 @@ def test_what_is_wrong_is_an_answer(asked: str, cause: str) -> None:
     assert cause in f"{problem['where']} {problem['cause']}"
 
 
-def test_files_of_messages_are_never_read_from_the_disk(tmp_path: Path) -> None:
-    secret = tmp_path / "laws.yaml"
-    secret.write_text("key: kept to myself")
+def test_files_of_messages_are_never_read_from_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "laws.json").write_bytes(FILE.read_bytes())
+    monkeypatch.chdir(tmp_path)
     files = source(open_design("cheetah"))["files"]
-    files["parameters.yaml"] += f"\ntrends: {secret}\n"
-    (problem, *_) = answer(message(files=files))["problems"]
-    assert "kept to myself" not in str(problem)
+    files["parameters.yaml"] += "\ntrends: laws.json\n"
+    (problem,) = answer(message(files=files))["problems"]
+    assert (problem["where"], problem["cause"]) == ("laws.json", "file not found")
+    own = {"laws.json": Path("laws.json").read_text("utf-8")}
+    assert "robot" in answer(message(files=files | own))
+
+
+def test_parts_that_are_no_text_go_with_their_robot(tmp_path: Path) -> None:
+    design = own_parts.everything().resolve()
+    own = source(design)
+    assert {"parts/box.stl", "hook.stl"} == {*own["binary"]}
+    assert "motor.obj" in own["files"]
+    asked = {name: own[name] for name in ("files", "binary", "values")}
+    found = answer(message(**asked))
+    assert found["robot"]["xml"] == plane_xml(design.build())
+    folder = own_parts.folder(tmp_path / "robot", design.spec, {})
+    text = page([folder], tmp_path / "page", live=True)[0].read_text("utf-8")
+    assert own["binary"]["hook.stl"] in text
 
 
 @pytest.fixture
@@ -134,13 +155,21 @@ def test_a_server_has_no_other_files(server: MessageServer, path: str) -> None:
         ({"Origin": "null"}, 403),
         ({"Content_Type": "text/plain"}, 400),
         ({"Content_Length": "-1"}, 400),
-        ({"Content_Length": str(MOST + 1)}, 413),
+        ({"Content_Length": "9" * 5000}, 400),
     ],
 )
 def test_other_sites_and_odd_messages_are_refused(
     server: MessageServer, headers: dict[str, str], status: int
 ) -> None:
     assert request(server, "POST", "/designer", **{**JSON, **headers})[0] == status
+
+
+def test_a_message_that_is_too_long_is_refused_to_whoever_still_sends_it(
+    server: MessageServer,
+) -> None:
+    long = {**JSON, "body": "x" * (3 * MOST)}
+    assert request(server, "POST", "/designer", **long)[0] == 413
+    assert request(server, "POST", "/designer", **JSON)[0] == 200
 
 
 def test_a_fault_of_draft_is_an_answer_and_its_server_stays(
@@ -167,7 +196,7 @@ def test_a_port_that_is_taken_is_said(server: MessageServer) -> None:
     [
         ({"live": True, "python": True}, "`live` and `python` both let a page change designs"),
         ({"live": True, "single": True}, "a page of one file changes no designs"),
-        ({"python": True, "policies": ["a.onnx"]}, "has the policies that ship alone"),
+        ({"python": True, "policies": ["a.onnx"]}, "has only the policies that ship with Draft"),
     ],
 )
 def test_pages_without_room_for_a_designer_say_so(
@@ -304,6 +333,13 @@ def test_files_are_edited_and_a_robot_of_ones_own_is_dropped_in(
     tab.set_input_files("#design-open", str(other))
     settle(tab, problems=True)
     assert "a robot has no such file" in tab.inner_text("#design-problems")
+    tab.select_option("#design-file", "root.yaml")
+    tab.click("#design-apply")  # Files that were refused are not asked for again.
+    settle(tab)
+    other.write_bytes(b"\x00\xff")
+    tab.set_input_files("#design-open", str(other))
+    settle(tab, problems=True)
+    assert "it is no text" in tab.inner_text("#design-problems")
     assert tab.faults == []
 
 
@@ -321,6 +357,104 @@ def test_sliders_of_the_page_and_fields_are_of_one_robot(opened: Open) -> None:
     put(tab, "thigh_length", "0.24")
     settle(tab)
     assert float(tab.input_value("[id=thigh_length]")) == 0.24
+    assert tab.faults == []
+
+
+def slide_to_the_end(tab: Any) -> None:
+    tab.locator("[id=thigh_length]").focus()
+    tab.keyboard.press("End")
+
+
+@pytest.mark.slow
+def test_a_slider_that_moves_before_the_answer_counts(opened: Open) -> None:
+    tab = opened("cheetah", vary=("thigh_length=0.22:0.3",))
+    tab.evaluate(
+        """() => {
+          const { designer } = draftPage, ask = designer.ask;
+          designer.ask = async (text) => {
+            await new Promise((take) => { window.go = take; });
+            designer.ask = ask;
+            return ask(text);
+          };
+        }"""
+    )
+    put(tab, "shank_length", "0.26")
+    slide_to_the_end(tab)
+    tab.evaluate("go()")
+    settle(tab)
+    values = {**open_design("cheetah").values, "thigh_length": 0.3, "shank_length": 0.26}
+    assert mass(tab) == pytest.approx(open_design("cheetah").spec.resolve(values).mass, abs=0.005)
+    assert float(tab.input_value("[id=thigh_length]")) == 0.3
+    assert tab.evaluate("draftPage.networks.size") == 1
+    assert tab.faults == []
+
+
+@pytest.mark.slow
+def test_sliders_of_the_page_leave_a_robot_of_other_files(opened: Open) -> None:
+    tab = opened("cheetah", vary=("thigh_length=0.22:0.3",))
+    folder = open_design("biped").spec.folder
+    assert folder is not None
+    tab.click("#design-fields summary")
+    own = [str(folder / f"{name}.yaml") for name in ("parameters", "tree", "root")]
+    tab.set_input_files("#design-open", own)
+    tab.wait_for_function("draftPage.designer.changed[0]")
+    settle(tab)
+    slide_to_the_end(tab)
+    settle(tab)
+    assert tab.inner_text("#sliders output") == "–"
+    assert tab.inner_text("#design-changed") == ""
+    assert tab.inner_text("#name") == "biped"
+    tab.click("#design-back")
+    settle(tab)
+    assert tab.inner_text("#name") == "cheetah"
+    assert tab.inner_text("#sliders output") == "0.250 m"
+    slide_to_the_end(tab)
+    settle(tab)
+    assert tab.inner_text("#sliders output") == "0.300 m"
+    assert tab.inner_text("#design-changed") == "--set thigh_length=0.3"
+    assert tab.faults == []
+
+
+@pytest.mark.slow
+def test_a_field_of_the_first_robot_moves_the_sliders_and_the_others_with_them(
+    opened: Open,
+) -> None:
+    tab = opened("cheetah", "bear", vary=("thigh_length=*0.8:*1.2",))
+    tab.click("#robots button:nth-child(2)")
+    before = mass(tab)
+    assert tab.inner_text("#design-changed") == ""
+    tab.click("#robots button:nth-child(1)")
+    length = open_design("cheetah").parameters["thigh_length"]
+    put(tab, "thigh_length", str(1.2 * float(length)))
+    settle(tab)
+    tab.click("#robots button:nth-child(2)")
+    assert mass(tab) > before
+    assert "thigh_length=" in tab.inner_text("#design-changed")
+    assert tab.evaluate("draftPage.designer.changed") == [True, False]
+    assert tab.faults == []
+
+
+@pytest.mark.slow
+def test_problems_and_texts_stay_with_their_robot(opened: Open) -> None:
+    tab = opened("cheetah", "arm")
+    put(tab, "thigh_length", "3")
+    settle(tab, problems=True)
+    tab.click("#robots button:nth-child(2)")
+    assert tab.locator("#design-problems li").count() == 0
+    put(tab, "upper_arm_length", "0.5")
+    settle(tab)
+    tab.click("#design-fields summary")
+    tab.fill("#design-text", "# not applied")
+    put(tab, "upper_arm_length", "0.51 * 1")
+    settle(tab)
+    assert tab.input_value("#design-text") == "# not applied"
+    assert tab.inner_text("#design-changed") == "--set 'upper_arm_length=0.51 * 1'"
+    tab.click("#robots button:nth-child(1)")
+    assert "outside its range" in tab.inner_text("#design-problems")
+    assert tab.input_value("[data-name=thigh_length]") == "3"
+    tab.evaluate("draftPage.designer.take({'parameters.yaml': '#'.repeat(5e6)})")
+    tab.wait_for_function("document.getElementById('design-problems').innerText.includes('bytes')")
+    assert "4000000 at most" in tab.inner_text("#design-problems")
     assert tab.faults == []
 
 

@@ -2,18 +2,9 @@
 // @ts-ignore: a file of the page, beside this one.
 import loadMujoco from "./mujoco.js";
 import { Bridge } from "./bridge.js";
+import { fetched } from "./compressed.js";
 
 const HOME = "/draft"; // Draft and its thin `mujoco`, in the worker's own file system.
-
-/**
- * Fetch a file of a page's folder that is compressed there.
- * @param {string} name
- */
-async function part(name) {
-  const answer = await fetch(`./${name}.gz`);
-  if (!answer.ok || !answer.body) throw new Error(`${name}.gz: ${answer.status}; the page needs all of its folder`);
-  return new Response(answer.body.pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
-}
 
 /**
  * Fetch a file of Pyodide; the browser refuses any other content than that of its hash.
@@ -36,7 +27,7 @@ async function start({ own, packages, hashes, needed, skill }) {
   const say = (/** @type {string} */ status) => postMessage({ status });
   say("Python is loading.");
   const names = Object.keys(hashes);
-  const [archive, wasmBinary, ...blobs] = await Promise.all([part("draft.zip"), part("mujoco.wasm"),
+  const [archive, wasmBinary, ...blobs] = await Promise.all([fetched("draft.zip"), fetched("mujoco.wasm"),
     ...names.map((name) => checked(own + name, hashes[name]))]);
   const at = Object.fromEntries(names.map((name, i) => [name, URL.createObjectURL(
     new Blob([blobs[i]], { type: name.endsWith(".wasm") ? "application/wasm" : "text/javascript" }))]));

@@ -4,12 +4,14 @@ A page asks with messages, and one class answers them in both places: in the pro
 (`live.py`), and in a worker of the browser, where Python runs with a MuJoCo of the page
 (`thin/mujoco.py`). Messages are JSON:
 
-    {"id": 7, "files": {"parameters.yaml": "...", ...}, "values": {"thigh_length": 0.3},
-     "title": "cheetah", "color": "#33608f", "known": ["policy-0123456789ab"]}
+    {"id": 7, "files": {"parameters.yaml": "...", ...}, "binary": {"thigh.stl": "..."},
+     "values": {"thigh_length": 0.3}, "title": "cheetah", "color": "#33608f",
+     "known": ["policy-0123456789ab"]}
 
-are answered by the robot as the page has it (`draft.browser.robots.robot`), with the verdict, the
-findings and the text of the model; the numbers of its network, unless the page knows it; and its
-fields, or by the problems. A robot without a title has that of its files.
+with files that are no text in base64 as `binary`, are answered by the robot as the page has it
+(`draft.browser.robots.robot`), with the verdict, the findings and the text of the model; the
+numbers of its network, unless the page knows it; and its fields, or by the problems. A robot
+without a title has that of its files.
 
     {"id": 7, "robot": {...}, "network": "...", "fields": [{"name": "thigh_length", ...}]}
     {"id": 7, "problems": [{"where": "tree.yaml:3:5", "cause": "...", "remedy": "..."}]}
@@ -43,6 +45,7 @@ class _Request(pydantic.BaseModel):
 
     id: int
     files: dict[str, str]
+    binary: dict[str, pydantic.Base64Bytes] = {}
     values: dict[str, float | str | None]
     title: str
     color: str
@@ -77,7 +80,7 @@ class Designer:
         return json.dumps({"id": asked.id, **found}, allow_nan=False)
 
     def _robot(self, asked: _Request) -> dict[str, Any]:
-        design = _spec(tuple(asked.files.items())).resolve(dict(asked.values))
+        design = _spec((*asked.files.items(), *asked.binary.items())).resolve(dict(asked.values))
         model = compiled(design)
         title = asked.title or design.name
         made = robot(model, title, asked.color, driven([model], self._skill, self._policies))
@@ -90,7 +93,7 @@ class Designer:
 
 
 @lru_cache(maxsize=_KEPT)
-def _spec(files: tuple[tuple[str, str], ...]) -> Spec:
+def _spec(files: tuple[tuple[str, str | bytes], ...]) -> Spec:
     return Spec.parse(dict(files))
 
 
@@ -100,13 +103,23 @@ def _plain(problem: Problem) -> dict[str, str]:
 
 
 def source(design: Design) -> dict[str, Any]:
-    """Files of a design's robot by name, the design's values and its fields, for messages."""
+    """Files of a design's robot by name, the design's values and its fields, for messages.
+
+    Files that are no text, such as parts of binary STL, are in base64 under "binary".
+    """
     values = {
         name: value if value is None or isinstance(value, str) else scalar(value)
         for name, value in design.values.items()
     }
-    files = {name: file.read_bytes().decode() for name, file in design.spec.files.items()}
-    return {"files": files, "values": values, "fields": list(fields(design))}
+    files, binary = {}, {}
+    for name, file in design.spec.files.items():
+        content = file.read_bytes()
+        try:
+            files[name] = content.decode()
+        except UnicodeDecodeError:
+            binary[name] = base64.b64encode(content).decode()
+    own = {"files": files, "binary": binary}
+    return {**own, "values": values, "fields": list(fields(design))}
 
 
 def fields(design: Design) -> Iterator[dict[str, Any]]:

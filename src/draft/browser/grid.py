@@ -130,7 +130,7 @@ def _own_ranges(design: Design, vary: Vary) -> Vary:
         name, _, text = map(str.strip, str(word).partition("="))
         factors = _FACTORS.fullmatch(text)
         if factors and name not in own:
-            cause = f"`vary` '{word}': {name} of {design.name} is no number that it states"
+            cause = f"`vary` '{word}': '{name}' is not a stated number of {design.name}"
             raise DraftError(cause, f"give a plain range, or vary one of {quoted(own)}")
         ends = [own[name] * float(factor) for factor in factors.groups()] if factors else []
         found.append(f"{name}={ends[0]!r}:{ends[1]!r}" if ends else word)

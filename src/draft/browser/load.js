@@ -1,4 +1,5 @@
-// What a page was written with: its data, and its larger parts, which are compressed.
+// What a page was written with: its data, and its larger parts.
+import { fetched, unpacked } from "draft/compressed";
 
 /** Data of the page. */
 export const page = JSON.parse(/** @type {HTMLElement} */ (document.getElementById("draft-page")).textContent ?? "");
@@ -10,13 +11,6 @@ export const page = JSON.parse(/** @type {HTMLElement} */ (document.getElementBy
  */
 export async function part(name) {
   const inside = document.getElementById(`part-${name}`);
-  let packed;
-  if (inside) {
-    packed = new Blob([Uint8Array.from(atob(inside.textContent ?? ""), (c) => c.charCodeAt(0))]).stream();
-  } else {
-    const answer = await fetch(`./${name}.gz`);
-    if (!answer.ok || !answer.body) throw new Error(`${name}.gz: ${answer.status}; the page needs all of its folder`);
-    packed = answer.body;
-  }
-  return new Response(packed.pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+  if (!inside) return fetched(name);
+  return unpacked(new Blob([Uint8Array.from(atob(inside.textContent ?? ""), (c) => c.charCodeAt(0))]).stream());
 }

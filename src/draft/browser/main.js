@@ -2,6 +2,7 @@
 import loadMujoco from "mujoco";
 import { Bodies } from "draft/bodies";
 import { Designer } from "draft/designer";
+import { element } from "draft/element";
 import { Limits } from "draft/limits";
 import { page, part } from "draft/load";
 import { Network } from "draft/network";
@@ -14,19 +15,6 @@ const PUSH = 0.35; // Velocity of a push per sqrt(g h), h the height of the robo
 const SMOOTH = 0.03; // Weight of the newest speed in the one that is shown.
 const $ = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 
-/**
- * An element with a text, which is never read as HTML.
- * @param {string} tag
- * @param {string} text
- * @param {string} kind class of it
- */
-function element(tag, text, kind = "") {
-  const made = document.createElement(tag);
-  made.textContent = text;
-  if (kind) made.className = kind;
-  return made;
-}
-
 class Page {
   /**
    * @param {any} mujoco
@@ -37,7 +25,7 @@ class Page {
     this.bodies = bodies;
     this.networks = networks;
     this.robots = page.robots.map((/** @type {any} */ one) => new Robot(mujoco, one, one.policy &&
-      Network.read(/** @type {Float32Array} */ (networks.get(one.network)), one.policy.sizes), one.numbers));
+      Network.read(/** @type {Float32Array} */ (networks.get(one.network)).slice(), one.policy.sizes), one.numbers));
     for (const robot of this.robots) robot.refresh(); // Each model may have grown the memory.
     this.shown = 0; // Robot of the panel.
     this.speeds = this.robots.map(() => 0);
@@ -47,10 +35,8 @@ class Page {
     this.count = { pictures: 0, simulated: 0, wall: 0, reshaped: 0 };
     this.limits = new Limits($("limits"));
     const sliders = ["forward", "left", "turn"].map($);
-    const fastest = Math.max(0.1, ...page.robots.map((/** @type {any} */ one) => one.numbers.forward?.[0] ?? 0));
-    [fastest, Math.min(0.6 * fastest, 0.6), 1].forEach((end, i) => {
-      Object.assign(sliders[i], { min: -end, max: end, step: end / 100, value: 0 });
-    });
+    for (const slider of sliders) slider.value = "0";
+    this.ranges(sliders);
     this.steering = new Steering(sliders, { push: (side) => this.push(side), changed: () => this.steer() });
     this.buttons();
     this.shapes();
@@ -60,6 +46,19 @@ class Page {
     this.choose(0);
     this.open();
     requestAnimationFrame((now) => this.frame(now));
+  }
+
+  /**
+   * Give the commands the ranges of the robots; values stay within them.
+   * @param {HTMLInputElement[]} sliders
+   */
+  ranges(sliders) {
+    const fastest = Math.max(0.1, ...page.robots.map((/** @type {any} */ one) => one.numbers.forward?.[0] ?? 0));
+    [fastest, Math.min(0.6 * fastest, 0.6), 1].forEach((end, i) => {
+      const { value } = sliders[i];
+      Object.assign(sliders[i], { min: -end, max: end, step: end / 100 });
+      sliders[i].value = value; // A change of the range alone would round it.
+    });
   }
 
   buttons() {
@@ -112,13 +111,16 @@ class Page {
     });
   }
 
-  /** Give the robots the bodies of the sliders. */
-  reshape() {
+  /**
+   * Give the robots the bodies of the sliders.
+   * @param {boolean} moved whether by the visitor; else those that the designer has stay
+   */
+  reshape(moved = true) {
     if (!this.bodies.length) return;
     const begun = performance.now();
     this.bodies.forEach((bodies, i) => {
       const values = this.values(i);
-      if (this.designer.slide(i, values)) return;
+      if (this.designer.slide(i, values, moved)) return;
       const { columns, said, between } = bodies.at(values);
       this.robots[i].setBody(columns, bodies.vary.columns);
       Object.assign(page.robots[i], { said, between });
@@ -144,6 +146,7 @@ class Page {
     Object.assign(this.picture, { yaw, pitch, away }); // The view is the visitor's.
     this.picture.follow(true);
     $("steering").hidden = this.robots.every((/** @type {Robot} */ one) => !one.policy);
+    this.ranges(["forward", "left", "turn"].map($));
     this.steer();
   }
 
@@ -205,7 +208,8 @@ class Page {
     const one = page.robots[index], { said } = one, { model } = this.robots[index];
     this.shaped.forEach((slider, i) => {
       const shown = slider.parentElement?.querySelector("output"), { unit } = this.bodies[index].vary.sliders[i];
-      if (shown) shown.textContent = `${this.values(index)[i].toPrecision(3)} ${unit}`;
+      const value = this.designer.number(index, slider.id, this.values(index)[i]);
+      if (shown) shown.textContent = value === null ? "–" : `${value.toPrecision(3)} ${unit}`;
     });
     [...$("robots").children].forEach((tab, i) => tab.classList.toggle("chosen", i === index));
     $("name").textContent = one.title;

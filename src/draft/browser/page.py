@@ -24,6 +24,7 @@ from draft.explore.comparison import titles
 from draft.extras import own_version
 from draft.learn.policy.reduced import open_any
 from draft.plotting import COLORS
+from draft.serving import messages
 from draft.spec import Spec
 from draft.variation.axes import Vary
 from draft.webpage import webpage
@@ -32,10 +33,12 @@ SKILLS = ("walk", "run", "push")
 _MODULES = (
     "bodies",
     "designer",
+    "element",
     "inertia",
     "limits",
     "load",
     "network",
+    "compressed",
     "picture",
     "robot",
     "steer",
@@ -97,7 +100,8 @@ def page(
     by = [one.by for one in varied] or [driven([model], skill, own) for model in models]
     rows = zip(models, titles(opened), COLORS, by, strict=False)  # There are more colours.
     robots = [robot(*row) for row in rows]
-    designer = {"kind": "live" if live else "python" if python else ""}
+    kind = "live" if live else "python" if python else ""
+    designer: dict[str, Any] = {"kind": kind, "most": messages.MOST}
     if live or python:
         for one, design in zip(robots, opened, strict=True):
             one.plain["source"] = source(design)
@@ -139,7 +143,7 @@ def _check_designer(live: bool, python: bool, single: bool, own: bool) -> None:
         cause = "a page of one file changes no designs: browsers start nothing beside such a page"
         raise DraftError(cause, f"omit `single`, or `{'live' if live else 'python'}`")
     if python and own:
-        cause = "Python in a browser has the policies that ship alone"
+        cause = "Python in a browser has only the policies that ship with Draft"
         raise DraftError(cause, "pass `live` for policies of your own")
 
 

@@ -10,9 +10,11 @@ import tyro
 
 from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import DesignArguments, OwnPolicies
-from draft.errors import counted
+from draft.errors import DraftError, counted
 from draft.serving.addresses import address, check_free, check_port
 from draft.serving.messages import HOST
+
+_PORT = 8080
 
 
 def main(
@@ -44,13 +46,18 @@ def main(
         ),
     ] = False,
     port: Annotated[
-        int, tyro.conf.arg(metavar="N", help="Port of --live; 0 for any free one.")
-    ] = 8080,
+        int | None,
+        tyro.conf.arg(
+            metavar="N",
+            help="Port of --live; 0 for any free one.",
+            help_behavior_hint=f"(default: {_PORT})",
+        ),
+    ] = None,
     python: Annotated[
         bool,
         tyro.conf.arg(
-            help="The same without a server: a button in the page loads Python (11 MB) from a "
-            "public host into the visitor's browser."
+            help="Let visitors change every number and file, without a server: a button in the "
+            "page loads Python (11 MB) from a public host into their browser."
         ),
     ] = False,
     out: Annotated[
@@ -69,9 +76,11 @@ def main(
     drives stands, and the page says why.
     """
     start = time.perf_counter()
-    check_port(port)
+    if port is not None and not live:
+        raise DraftError("--port needs --live: nothing is served", "add --live, or omit --port")
+    check_port(place := _PORT if port is None else port)
     if live:
-        check_free(HOST, port)
+        check_free(HOST, place)
     from draft.browser.page import page
 
     with if_interrupted(NOTHING):
@@ -82,7 +91,7 @@ def main(
     if live:
         from draft.browser.live import serve
 
-        server = serve(written, skill, policy, port)
+        server = serve(written, skill, policy, place)
         print(f"open {address(HOST, server.port)} in a browser; Ctrl-C ends it", flush=True)
         try:
             threading.Event().wait()

@@ -17,6 +17,8 @@ from draft.serving.guard import Answer, judge, read_request
 
 HOST = "127.0.0.1"
 MOST = 4_000_000  # Length of a message [bytes].
+_READ = 4 * MOST  # Of a longer one, so that whoever sends it hears that it is refused.
+_CHUNK = 65_536
 _TYPES = {".js": "text/javascript", ".gz": "application/octet-stream"}  # As browsers need them.
 
 
@@ -43,7 +45,7 @@ class MessageServer:
             port: port to serve on; 0 for any free one.
 
         Raises:
-            DraftError: the port is taken, or is none.
+            DraftError: the port is invalid or in use.
         """
         check_port(port)
         check_free(HOST, port)
@@ -98,9 +100,13 @@ class _Handler(BaseHTTPRequestHandler):
         length = self.headers.get("Content-Length", "")
         # Other sites cannot send this type without asking, which nothing here permits.
         json = self.headers.get_content_type() == "application/json"
-        if path != self.path_of_messages or not json or not length.isdecimal():
+        number = length.isdecimal() and len(length) < 10
+        if path != self.path_of_messages or not json or not number:
             self._send(HTTPStatus.BAD_REQUEST, b"This is no message of the page.", "text/plain")
         elif int(length) > MOST:
+            left = min(int(length), _READ)
+            while left > 0 and (part := self.rfile.read(min(left, _CHUNK))):
+                left -= len(part)
             cause = f"A message has {MOST} bytes at most."
             self._send(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, cause.encode(), "text/plain")
         else:
