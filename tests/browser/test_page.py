@@ -178,7 +178,7 @@ def test_texts_of_users_cannot_leave_their_place(tmp_path: Path) -> None:
         ([], {}, "a page shows 1 to 6 designs, not 0"),
         (["cheetah"] * 7, {}, "a page shows 1 to 6 designs, not 7"),
         (["cheetah"], {"skill": "climb"}, "a page shows no skill 'climb'"),
-        (["cheetah"], {"vary": ["thigh=*0.8:*1.2"]}, "thigh of quadruped is no number that it"),
+        (["cheetah"], {"vary": ["thigh=*0.8:*1.2"]}, "'thigh' is not a stated number of quadruped"),
         (["cheetah"], {"vary": ["thigh_length=*.:*1"]}, "'*.' is not a number"),
         (["cheetah"], {"vary": ["thigh_length=0.2,0.3"]}, "lists values, and a slider has a range"),
         (["cheetah"], {"vary": ["thigh=0.2:0.3"]}, "'thigh' is not a parameter"),
