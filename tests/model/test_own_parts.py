@@ -412,6 +412,7 @@ def test_a_bad_step_file_says_nothing_on_stdout(
 def test_pages_and_the_command_line_show_the_parts(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    pytest.importorskip("plotly")
     written.folder(tmp_path / "own", everything(), {})
     assert main(["show", str(tmp_path / "own")]) == 0
     shown = capsys.readouterr().out
