@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from draft.design import Design
 from draft.learn.bodies.legged import legged_robot
@@ -21,7 +22,8 @@ SEEN = ("base_ang_vel", "projected_gravity", "joint_pos", "joint_vel", "actions"
 def policy_file(
     file: Path, design: Design, terms: Sequence[str] = SEEN, delay: float = 0.0, history: int = 1
 ) -> Path:
-    """Write a policy with these terms for a design."""
+    """Write a policy with these terms for a design; the test skips without ONNX."""
+    pytest.importorskip("onnx", reason="needs the extra learn")
     model, random = design.build(), np.random.default_rng(0)
     member = legged_robot(design, model)
     count = len(member.joints)
