@@ -100,7 +100,9 @@ def power(x: Value, exponent: Value) -> Value:
     """Real power: a negative base with a fractional exponent is an error, not a complex number."""
     if is_array(x) or is_array(exponent):
         return np.power(x, exponent)
-    return math.pow(x, exponent)
+    math.pow(x, exponent)  # It raises where there is no real power, which NumPy does not.
+    # That of NumPy, which may differ in the last digit: a design alone is what it is among many.
+    return float(np.power(float(x), float(exponent)))
 
 
 def divide(x: Value, y: Value) -> Value:
