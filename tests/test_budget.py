@@ -17,7 +17,7 @@ SOURCE = Path(draft.__file__).parent
 BUDGET = {
     ".": 2_580,  # Reading of STL and OBJ, from `imports`.
     "assistant": 620,
-    "browser": 1_306,  # Parts that are no text in the messages of a page, its modules and limits.
+    "browser": 1_300,  # Parts that are no text in the messages of a page, its modules and limits.
     "cli": 6_030,  # `--live` and `--python` of pages, and `deploy`.
     "deployment": 921,  # Controllers of a policy in C++ and Python, which stop on bad targets.
     "description": 2_330,

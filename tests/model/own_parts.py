@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import trimesh
 
@@ -131,3 +132,19 @@ def everything() -> draft.Spec:
         {"file": "parts/box.stl", "mass": 9.0, **inertia},
         children=BOTH,
     )
+
+
+def tensor(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """Inertia about the centre of mass in the axes of a body [kg m2]."""
+    body, turn = model.body(name), np.empty(9)
+    mujoco.mju_quat2Mat(turn, body.iquat)
+    axes = turn.reshape(3, 3)
+    return axes @ np.diag(body.inertia) @ axes.T
+
+
+def points_of(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Vertices of a mesh in the frame of its body [m]."""
+    mesh, turn = model.geom_dataid[geom], np.empty(9)
+    start, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+    return model.mesh_vert[start : start + count] @ turn.reshape(3, 3).T + model.geom_pos[geom]

@@ -1,4 +1,5 @@
-// Changing any number or file of a design: fields and texts, and who answers (`designer.py`).
+// Changing any number or file of a design: its fields and texts. `asking.js` finds who answers.
+import { PythonWorker, askProcess } from "draft/asking";
 import { element } from "draft/element";
 import { page } from "draft/load";
 import { Network } from "draft/network";
@@ -20,55 +21,6 @@ const DIGITS = 5; // Of the numbers of sliders.
 /**
  * @typedef {{where: string, cause: string, remedy: string}} Problem
  */
-
-/**
- * Ask the process that serves a live page.
- * @param {string} message
- * @returns {Promise<string>}
- */
-async function askProcess(message) {
-  const body = new Blob([message]); // Its size is in bytes.
-  if (body.size > page.designer.most)
-    throw new Error(`The files of this robot make a message of ${body.size} bytes, and one has ${page.designer.most} at most.`);
-  let answer;
-  try {
-    answer = await fetch("./designer", { method: "POST", body, headers: { "Content-Type": "application/json" } });
-  } catch {
-    throw new Error("The process of this page has ended: run `draft page` with `--live` again.");
-  }
-  if (answer.ok) return answer.text();
-  throw new Error(answer.status === 500 || answer.status === 413 ? `${answer.status}: ${await answer.text()}`
-    : "Nothing here changes designs: run `draft page` with `--live`, whose page this is.");
-}
-
-/** Python in a worker, which starts with the first question. */
-class PythonWorker {
-  /** @param {(text: string) => void} said hears what it does while it starts */
-  constructor(said) {
-    this.worker = new Worker("./designer-worker.js", { type: "module" });
-    /** @type {{take: (text: string) => void, refuse: (error: Error) => void} | null} */
-    this.waiting = null;
-    this.worker.addEventListener("message", ({ data }) => {
-      if (data.status) said(data.status);
-      else if (data.problem) this.waiting?.refuse(new Error(data.problem));
-      else this.waiting?.take(data.answer);
-    });
-    this.worker.addEventListener("error", (event) =>
-      this.waiting?.refuse(new Error(`Python does not start here: ${event.message ?? "its worker cannot be read"}`)));
-    this.worker.postMessage({ start: page.designer });
-  }
-
-  /**
-   * @param {string} message
-   * @returns {Promise<string>}
-   */
-  ask(message) {
-    return new Promise((take, refuse) => {
-      this.waiting = { take, refuse };
-      this.worker.postMessage({ message });
-    });
-  }
-}
 
 /**
  * Whether two numbers are one in the digits that sliders have.

@@ -31,17 +31,8 @@ from draft.webpage import webpage
 
 SKILLS = ("walk", "run", "push")
 _MODULES = (
-    "bodies",
-    "designer",
-    "element",
-    "inertia",
-    "limits",
-    "load",
-    "network",
-    "compressed",
-    "picture",
-    "robot",
-    "steer",
+    *("asking", "bodies", "compressed", "designer", "element", "inertia", "limits", "load"),
+    *("network", "picture", "robot", "steer"),
 )
 _GAP = 0.5  # Room between two robots, per width of the wider one.
 _REMEDY = "choose another `out`"
