@@ -20,6 +20,7 @@ from draft.learn.bodies.legged import legged_robot  # noqa: E402
 from draft.learn.measuring.policies import commanded, open_source  # noqa: E402
 from draft.learn.policy.matching import Match, match_of  # noqa: E402
 from draft.learn.policy.policy import FAMILY, Policy, open_policy  # noqa: E402
+from draft.learn.policy.sensed import with_inputs  # noqa: E402
 from draft.learn.task.recipes import LAPTOP  # noqa: E402
 from draft.learn.training.options import SliceOptions, TrainOptions  # noqa: E402
 from draft.learn.training.ppo.ppo import action_std  # noqa: E402
@@ -28,7 +29,7 @@ from draft.learn.training.ppo.warm_start import ALONE  # noqa: E402
 from draft.learn.training.progress import PROGRESS, fastest  # noqa: E402
 from draft.learn.training.train import prepare  # noqa: E402
 from tests.learn.policy.test_matching import LEGS, SIGNS, made, tree  # noqa: E402
-from tests.learn.runs import QUICK, exported, trained  # noqa: E402
+from tests.learn.runs import QUICK, exported, train, trained, weights  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
 FLAT: dict[str, Any] = {"ground": "flat", "see_ground": False}
@@ -104,7 +105,7 @@ def test_values_of_a_critic_that_learns_alone_are_not_clipped(file: Path, tmp_pa
         old = values + 10.0  # Far from what it says now: clipping would bring it back near that.
         mean = alg.actor.mlp(own).detach()
         rest = (mean, old, zero, values, zero, mean, std)
-        found = float(alg._learn(own, seen, *rest, present=None)[0])
+        found = float(alg._learn(own, seen, *rest, present=None, taught=None)[0])
         alg.critic.load_state_dict(state)
         return found
 
@@ -137,6 +138,64 @@ def test_a_policy_that_learns_to_climb_keeps_what_it_knows_of_designs(tmp_path: 
     # As many samples as an exported policy's count for: one design's own move them little.
     assert int(normaliser.count) == 10_000_000
     assert normaliser.mean.shape[-1] > open_policy(FAMILY).network.size
+
+
+# What a machine observes: no velocity, and three steps of the rest.
+SENSED = HIDDEN | {"observations.linear_velocity": False, "observations.history": 3}
+
+
+def with_lessons(folder: Path, lessons: int, **more: Any) -> Trainer:
+    return started(folder, "family", values=SENSED | {"learning.lessons": lessons}, **more)
+
+
+def test_an_actor_without_the_velocity_first_acts_as_if_commands_were_followed(
+    tmp_path: Path,
+) -> None:
+    trainer, policy = with_lessons(tmp_path / "run", 0), open_policy(FAMILY)
+    manager = trainer.env.observation_manager
+    names, dims = manager.active_terms["actor"], manager.group_obs_term_dim["actor"]
+    terms = [(name, dim[0]) for name, dim in zip(names, dims, strict=True)]
+    past = [manager.get_term_cfg("actor", name).history_length or 1 for name in names]
+    agree(trainer, with_inputs(policy, terms, past))
+    # Without lessons the critic alone learns, as for any exported policy.
+    assert learner(trainer).teacher is None
+
+
+def test_an_actor_imitates_the_policy_that_it_starts_from(tmp_path: Path) -> None:
+    trainer = with_lessons(tmp_path / "run", 12, environments=32)
+    alg, lost = learner(trainer), []
+    noise = action_std(alg.actor).detach().clone()
+    trainer.train(12, report=lambda one: lost.append(one.row["loss/difference"]))
+    assert max(lost[-3:]) < 0.7 * lost[0]
+    assert torch.equal(action_std(alg.actor).detach(), noise)
+    assert not any(alg.optimizer.state.get(one) for one in alg.actor.distribution.parameters())
+    # Then it learns from rewards, and has no teacher.
+    trainer.train(13, report=lambda one: lost.append(one.row["loss/difference"]))
+    assert alg.teacher is None
+    assert lost[-1] == 0.0
+    assert not torch.equal(action_std(alg.actor).detach(), noise)
+
+
+def test_a_teacher_acts_by_what_the_critic_observes(tmp_path: Path) -> None:
+    """It sees the true velocity, joints without their bias, and nothing of the feet."""
+    trainer, policy = with_lessons(tmp_path / "run", 12), open_policy(FAMILY)
+    seen = trainer.runner.env.get_observations()["critic"]
+    sizes = [dim[0] for dim in trainer.env.observation_manager.group_obs_term_dim["critic"]]
+    names = trainer.env.observation_manager.active_terms["critic"]
+    parts = dict(zip(names, seen.split(sizes, dim=1), strict=True))
+    own = torch.cat([parts[name] for name, _ in policy.terms], dim=1)
+    found = learner(trainer).teacher(seen)
+    np.testing.assert_allclose(found.numpy(), policy(own.numpy()), atol=2e-5)
+
+
+def test_lessons_go_on_where_they_stopped(tmp_path: Path) -> None:
+    of = plan(stage="push", values=SENSED | {"learning.lessons": 4}, **FLAT)
+    whole, parts = (
+        train(learn.begin(tmp_path / name, of, {}, "family"), *slices)
+        for name, slices in (("whole", (6,)), ("parts", (3, 5, 6)))
+    )
+    one, other = weights(whole), weights(parts)
+    assert all(torch.equal(one[name], other[name]) for name in one)
 
 
 def test_a_run_that_starts_anew_is_known_to_run_as_fast_as_its_policy(tmp_path: Path) -> None:

@@ -458,6 +458,13 @@ class Learning:
     initial_std: float = choice(
         0.5, "1", "standard deviation of the first actions", CODE, within=POSITIVE
     )
+    lessons: int = choice(
+        0,
+        "1",
+        "first iterations, in which the actor imitates the exported policy that it starts from, if "
+        "it observes other things",
+        DRAFT,
+    )
     epochs: int = choice(5, "1", "passes over an iteration's samples", CODE, within=POSITIVE)
     mini_batches: int = choice(4, "1", "mini-batches per pass", CODE, within=POSITIVE)
     discount: float = choice(0.99, "1", "gamma", CODE, within=SHARE)

@@ -183,6 +183,8 @@ MACHINE = Recipe(
         "episodes.motor": Change((0.9, 1.1), "torque constants and gains as they are measured"),
         "episodes.joint_friction": Change((0.0, 0.04), "gearboxes, cold and warm"),
         "episodes.dry_friction": Change((0.0, 0.03), "gearboxes, cold and warm"),
+        "velocity.pushed": Change(0.3, "one policy runs and survives kicks"),
+        "learning.lessons": Change(80, "1 million steps: it runs as its teacher does"),
         "learning.iterations_base": Change(400, "it learns to feel its velocity too"),
         "learning.iterations_velocity": Change(400, "it learns to feel its velocity too"),
         "learning.iterations_push": Change(400, "it learns to feel its velocity too"),

@@ -1,17 +1,19 @@
 """PPO with rsl-rl's models, storage and checkpoints, and an update that is fast on CPUs.
 
-It differs from rsl-rl's PPO in six ways. Observations are normalised by statistics that change
+It differs from rsl-rl's PPO in seven ways. Observations are normalised by statistics that change
 only between iterations; in rsl-rl they change during a rollout, and the update then measures a KL
 divergence that no gradient caused. All processes share these statistics. Gradients and KL
 divergence of a mini-batch are reduced together. The networks can be kept mirror-symmetric. The
 learning rate and the weight of the entropy can decay at the end. In a mixture of robots with
 different joints, each learns from the actions of its own joints, and advantages are normalised for
-each topology.
+each topology. An actor can first imitate a teacher, in the states that it comes to by itself
+(DAgger: Ross, Gordon and Bagnell, 2011).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -37,7 +39,9 @@ class Ppo(PPO):
 
     Attributes:
         least_rate: floor of the adaptive learning rate.
-        learns_actor: whether `update` changes the actor and its statistics, or only the critic.
+        learns_actor: whether the actor learns from rewards; else its statistics rest too.
+        teacher: actions that the actor imitates instead, for what the critic observes; None for
+            none.
     """
 
     def __init__(
@@ -55,6 +59,7 @@ class Ppo(PPO):
         self.least_rate, self._symmetric = least_rate, symmetric
         self._first_rate, self._factor = self.learning_rate, 1.0
         self.learns_actor = True
+        self.teacher: Callable[[torch.Tensor], torch.Tensor] | None = None
         parameters = [*self.actor.parameters(), *self.critic.parameters()]
         self.optimizer = torch.optim.Adam(parameters, lr=self.learning_rate, fused=True)
         self._symmetry: Symmetric | None = None
@@ -141,7 +146,8 @@ class Ppo(PPO):
         """Learn from the rollout, then add its observations to the statistics.
 
         Returns:
-            Means over all mini-batches of "value" loss, "surrogate" loss, "entropy" and "kl".
+            Means over all mini-batches of "value" loss, "surrogate" loss, "entropy", "kl" and the
+            mean square of the "difference" from the teacher's actions, 0 without a teacher.
         """
         storage = self.storage
         seen = storage.observations.flatten(0, 1)
@@ -163,21 +169,24 @@ class Ppo(PPO):
                 present = present.repeat(len(storage.observations), 1)
                 actions, mean, std = rollout[0], *rollout[-2:]
                 rollout[4] = _log_prob(actions, mean, std, present)[:, None]
-        sums = torch.zeros(4, device=self.device)
+            taught = None if self.teacher is None else self.teacher(seen["critic"])
+        sums = torch.zeros(5, device=self.device)
         size = len(rollout[0]) // self.num_mini_batches
         for _ in range(self.num_learning_epochs):
             order = torch.randperm(size * self.num_mini_batches, device=self.device)
             for rows in order.split(size):
-                own = None if present is None else present[rows]
-                sums += self._learn(*(one[rows] for one in (*inputs, *rollout)), present=own)
+                own, told = (None if one is None else one[rows] for one in (present, taught))
+                samples = (one[rows] for one in (*inputs, *rollout))
+                sums += self._learn(*samples, present=own, taught=told)
         with torch.no_grad():
-            for model in (self.actor, self.critic) if self.learns_actor else (self.critic,):
+            rests = not self.learns_actor and taught is None
+            for model in (self.critic,) if rests else (self.actor, self.critic):
                 self._normalise(model, seen)
             if self._symmetry is not None:
                 # The weights too: a fused step rounds the last few numbers differently.
                 self._symmetry.project()
         storage.clear()
-        names = ("value", "surrogate", "entropy", "kl")
+        names = ("value", "surrogate", "entropy", "kl", "difference")
         means = sums / (self.num_learning_epochs * self.num_mini_batches)
         return dict(zip(names, means.tolist(), strict=True))
 
@@ -193,13 +202,14 @@ class Ppo(PPO):
         old_mean: torch.Tensor,
         old_std: torch.Tensor,
         present: torch.Tensor | None,
+        taught: torch.Tensor | None,
     ) -> torch.Tensor:
         """Take one gradient step on a mini-batch, each argument of shape (samples, ...).
 
-        `present` tells which actions move a joint; None for all.
+        `present` tells which actions move a joint; None for all. `taught` are a teacher's actions.
 
         Returns:
-            Value loss, surrogate loss, entropy and KL divergence, shape (4,).
+            Value loss, surrogate loss, entropy, KL divergence and difference, shape (5,).
         """
         mean = self.actor.mlp(seen)
         values = self.critic.mlp(seen_by_critic)
@@ -230,6 +240,8 @@ class Ppo(PPO):
         loss = self.value_loss_coef * value + share * (
             surrogate - self._factor * self.entropy_coef * entropy
         )
+        difference = torch.zeros_like(kl) if taught is None else (mean - taught).square().mean()
+        loss = loss + difference
         self.optimizer.zero_grad(set_to_none=False)
         loss.backward()
         kl = self._reduce(kl)
@@ -240,10 +252,12 @@ class Ppo(PPO):
             torch.nn.utils.clip_grad_norm_(model.parameters(), self.max_grad_norm)
         if not self.learns_actor:
             # With gradients of zero Adam would count steps, and overshoot when the actor begins.
-            for parameter in self.actor.parameters():
+            resting: Any = self.actor if taught is None else self.actor.distribution
+            for parameter in resting.parameters():
                 parameter.grad = None
         self.optimizer.step()
-        return torch.stack((value.detach(), surrogate.detach(), entropy.detach(), kl))
+        losses = (value, surrogate, entropy, kl, difference)
+        return torch.stack([one.detach() for one in losses])
 
     def _adapt(self, kl: float) -> None:
         """Adapt the learning rate to the desired KL divergence."""

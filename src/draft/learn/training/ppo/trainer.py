@@ -13,17 +13,21 @@ import torch
 from draft.errors import DraftError, counted
 from draft.learn.engine.machine import WARP
 from draft.learn.engine.worlds.ranks import Ranks, rank_seed
-from draft.learn.policy.matching import match_of
+from draft.learn.policy.matching import Match, match_of
+from draft.learn.policy.policy import Policy
 from draft.learn.policy.reduced import open_for
+from draft.learn.policy.sensed import with_inputs
 from draft.learn.training.ppo.agent import Runner, agent_settings
 from draft.learn.training.ppo.checkpoint import first_sentence, read_checkpoint, write_checkpoint
 from draft.learn.training.ppo.log import Row, Table
 from draft.learn.training.ppo.ppo import Ppo
 from draft.learn.training.ppo.warm_start import (
     ALONE,
+    check_unchanged,
     load_exported,
     load_of_legs,
     load_policy,
+    teacher,
     widened,
 )
 from draft.learn.training.ppo.worlds import Worlds
@@ -73,9 +77,13 @@ class Trainer:
         self._worlds.observe(plan, self._ranks)
         self.iteration, self.seconds = 0, 0.0
         self._total = run.total()
-        exported = plan.origin is not None and plan.origin.policy_file is not None
-        self._alone = ALONE if exported else 0  # Iterations of the critic alone.
+        file = plan.origin.policy_file if plan.origin is not None else None
+        self._alone = ALONE if file is not None else 0  # Iterations without rewards for the actor.
         self._saved = self._resume()
+        self._first: tuple[Policy, Match] | None = None
+        begins = self.iteration < max(ALONE, plan.config.learning.lessons)
+        if plan.origin is not None and file is not None and not plan.mixed and begins:
+            self._first = self._exported(plan.origin, file)
         if self._saved is None:
             self._turn()
             self._start(plan.origin)
@@ -191,6 +199,8 @@ class Trainer:
             raise self._diverged("observations")
         if isinstance(alg, Ppo):
             alg.learns_actor = self.iteration >= self._alone
+            if alg.learns_actor:
+                alg.teacher = None
             alg.decay(self._decayed())
         losses = alg.update()
         if not self._ranks.all(all(math.isfinite(value) for value in losses.values())):
@@ -231,18 +241,41 @@ class Trainer:
         file = origin.policy_file if origin is not None else None
         if origin is not None and file is not None and self._run.plan.mixed:
             load_of_legs(self.runner.alg, file, origin)
-        elif origin is not None and file is not None:
-            members = self._run.plan.members
-            policy = open_for(file, members)
-            of_joints = match_of(policy, members[0])
-            if isinstance(of_joints, str):
-                raise DraftError(f"{file} does not drive the robot: {of_joints}", _BROKEN)
+        elif origin is not None and self._first is not None:
+            policy, of_joints = self._first
             load_exported(self.runner.alg, policy, origin, of_joints, self._fit)
         elif origin is not None:
             source = origin.folder(self._run.folder.parent)
             load_policy(self.runner.alg, source, origin, self.env.device, self._fit)
         if self._ranks.count > 1:
             self.runner.alg.broadcast_parameters()
+
+    def _exported(self, origin: Origin, file: Path) -> tuple[Policy, Match]:
+        """Return the exported policy to start from, with the inputs of this run, and its joints.
+
+        If those are other inputs, it is the teacher of the first iterations.
+
+        Raises:
+            DraftError: it has changed, does not drive the robot, or observes something else.
+        """
+        plan, alg = self._run.plan, self.runner.alg
+        check_unchanged(file, origin)
+        policy = open_for(file, plan.members)
+        of_joints = match_of(policy, plan.members[0])
+        if isinstance(of_joints, str):
+            raise DraftError(f"{file} does not drive the robot: {of_joints}", _BROKEN)
+        manager = self.env.observation_manager
+        names, dims = manager.active_terms["actor"], manager.group_obs_term_dim["actor"]
+        terms = [(name, dim[0]) for name, dim in zip(names, dims, strict=True)]
+        if SCAN not in dict(policy.terms):  # It is added to the policy by `_fit`.
+            terms = [term for term in terms if term[0] != SCAN]
+        past = [manager.get_term_cfg("actor", name).history_length or 1 for name, _ in terms]
+        if (tuple(terms), tuple(past)) == (policy.terms, policy.history):
+            return policy, of_joints
+        if isinstance(alg, Ppo) and plan.config.learning.lessons:
+            self._alone = max(ALONE, plan.config.learning.lessons)
+            alg.teacher = teacher(policy, of_joints)
+        return with_inputs(policy, terms, past), of_joints
 
     def _fit(self, content: dict[str, Any]) -> dict[str, Any]:
         """Add the height scan, without influence yet, to a policy that does not observe it."""

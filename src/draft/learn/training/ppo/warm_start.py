@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from rsl_rl.algorithms import PPO
+from torch.nn import functional
 
 from draft.errors import DraftError
 from draft.learn.policy.matching import OF_JOINTS, Match
@@ -81,18 +82,35 @@ def load_exported(
     Raises:
         DraftError: it has changed, or has other observations or layers.
     """
-    mean, divisor, layers = policy.network.layers()
-    order, sign = _inputs(policy, of_joints)
-    inverse = of_joints.inverse
-    joints, turned = np.array(inverse.joints), np.array(inverse.sign, np.float32)
-    first, bias = layers[0]
-    layers[0] = first[:, order] * sign, bias
-    last, offset = layers[-1]
-    layers[-1] = last[joints] * turned[:, None], offset[joints] * turned
     known = policy.action_std
     noise = known if len(known) else np.full(len(policy.joints), _ACTION_STD)
-    state = _state(alg, sign * mean[order], divisor[order], layers, noise[joints])
+    joints = np.array(of_joints.inverse.joints)
+    state = _state(alg, *_layers(policy, of_joints), noise[joints])
     _load(alg, policy.file, origin, {"actor_state_dict": state}, fit)
+
+
+def teacher(policy: Policy, of_joints: Match) -> Callable[[torch.Tensor], torch.Tensor]:
+    """Return the actions of a policy, for what the critic of a training observes.
+
+    It observes first what an actor with the velocity does, in the same order, without noise.
+
+    Args:
+        policy: the policy.
+        of_joints: joints of the robot for those of the policy.
+    """
+    mean, divisor, layers = _layers(policy, of_joints)
+    shift, scale = torch.tensor(mean), torch.tensor(divisor)
+    weights = [(torch.tensor(weight), torch.tensor(bias)) for weight, bias in layers]
+
+    def actions(seen: torch.Tensor) -> torch.Tensor:
+        values = (seen[:, : len(shift)] - shift.to(seen)) / scale.to(seen)
+        for i, (weight, bias) in enumerate(weights):
+            values = functional.linear(
+                functional.elu(values) if i else values, weight.to(seen), bias.to(seen)
+            )
+        return values
+
+    return actions
 
 
 def load_of_legs(alg: PPO, file: Path, origin: Origin) -> None:
@@ -136,6 +154,21 @@ def _state(
     return state
 
 
+def _layers(
+    policy: Policy, of_joints: Match
+) -> tuple[Numbers, Numbers, list[tuple[Numbers, Numbers]]]:
+    """Mean and divisor of the inputs, and layers, of a policy for a robot with other joints."""
+    mean, divisor, layers = policy.network.layers()
+    order, sign = _inputs(policy, of_joints)
+    inverse = of_joints.inverse
+    joints, turned = np.array(inverse.joints), np.array(inverse.sign, np.float32)
+    first, bias = layers[0]
+    layers[0] = first[:, order] * sign, bias
+    last, offset = layers[-1]
+    layers[-1] = last[joints] * turned[:, None], offset[joints] * turned
+    return sign * mean[order], divisor[order], layers
+
+
 def _inputs(policy: Policy, of_joints: Match) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     """Input of the policy for each input of a robot with other joints, and its sign."""
     order, sign, start = np.arange(policy.network.size), np.ones(policy.network.size, np.float32), 0
@@ -171,13 +204,22 @@ def load_policy(
     _load(alg, file, origin, read_checkpoint(file, device), fit, "critic")
 
 
+def check_unchanged(file: Path, origin: Origin) -> None:
+    """Check that a file is the one of the run's plan.
+
+    Raises:
+        DraftError: it is not.
+    """
+    if file_digest(file) != origin.digest:
+        cause = f"{file} has changed since this run was created"
+        raise DraftError(cause, "start a new run")
+
+
 def _load(
     alg: PPO, file: Path, origin: Origin, content: dict[str, Any], fit: Change, *more: str
 ) -> None:
     """Load the actor, and more, from a file that must be the one of the run's plan."""
-    if file_digest(file) != origin.digest:
-        cause = f"{file} has changed since this run was created"
-        raise DraftError(cause, "start a new run")
+    check_unchanged(file, origin)
     try:
         alg.load(fit(content), dict.fromkeys(("actor", *more), True), strict=True)
     except (KeyError, RuntimeError) as error:
