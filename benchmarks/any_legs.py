@@ -52,6 +52,7 @@ from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.generated import KINDS, generate_kind
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.engine.machine import cores
+from draft.learn.measuring.policies import of_legs
 from draft.learn.measuring.scalars import SURVIVAL
 from draft.learn.policy.policy import ANY
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy
@@ -173,7 +174,8 @@ def _kind(job: Job) -> dict[str, Any]:
         members = generate_kind(job.kind, job.count, job.seed, kinds).members
     legs = len(members[0].feet)
     options = {"replicas": job.replicas, "seconds": job.seconds, "seed": job.seed}
-    found = rolled_out(job.legs, members, cases_of(legs), **options)
+    source = of_legs(job.legs, job.legs.file.name, members[0])
+    found = rolled_out(source, members, cases_of(legs), **options)
     outside = [distance(job.legs, member) for member in members]
     return {
         "kind": job.kind,
@@ -217,7 +219,7 @@ def humanoid_speed(
     """Largest speed of a robot over the commands at which four of five stay up [m/s]."""
     cases = [Case.ahead(speed) for speed in SPEEDS]
     options = {"replicas": 2 * replicas, "seconds": seconds, "threads": cores()}
-    found = rolled_out(legs, [member], cases, **options)
+    found = rolled_out(of_legs(legs, legs.file.name, member), [member], cases, **options)
     root = math.sqrt(GRAVITY * member.leg_length)
     speeds = [found.reached(i) if found.up(i) >= SURVIVAL else None for i in range(len(cases))]
     known = [speed * root for speed in speeds if speed is not None]

@@ -1,4 +1,4 @@
-"""Roll-outs of one policy for all legs: what robots do at commands in units of their size.
+"""Roll-outs of a policy: what robots do at commands in units of their size.
 
 With leg length L and gravity g, velocities are per sqrt(g L) and rates of turn per sqrt(g / L). A
 roll-out starts near the home pose, with the noise, the delays and the errors of the training. One
@@ -27,7 +27,7 @@ from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.bodies.slots import describe
 from draft.learn.engine.machine import NATIVE
-from draft.learn.measuring.policies import config_of
+from draft.learn.measuring.policies import Source
 from draft.learn.measuring.utilisation import QUANTITIES, limiting, percentile
 from draft.learn.policy.reduced import LegsPolicy
 from draft.learn.silence import quiet
@@ -117,7 +117,7 @@ class Rolled:
 
 
 def rolled_out(
-    legs: LegsPolicy,
+    source: Source,
     members: Sequence[LeggedRobot],
     cases: Sequence[Case],
     *,
@@ -129,7 +129,7 @@ def rolled_out(
     """Roll out robots of one topology side by side, natively.
 
     Args:
-        legs: the policy.
+        source: the policy.
         members: the robots.
         cases: what is asked.
         replicas: roll-outs of each robot at each case.
@@ -138,12 +138,11 @@ def rolled_out(
         threads: threads of MuJoCo.
 
     Raises:
-        DraftError: a leg of a robot has more joints than the policy drives.
+        DraftError: the policy does not drive a robot.
     """
     import torch
 
     from draft.learn.engine.worlds.simulate import make
-    from draft.learn.measuring.rollout.by_slots import by_slots
     from draft.learn.measuring.rollout.evaluate import roll_out
     from draft.learn.measuring.rollout.trial import Trial
     from draft.learn.measuring.rollout.trial_env import env_cfg
@@ -152,9 +151,9 @@ def rolled_out(
     from draft.learn.task.world.task import Task
 
     torch.set_num_threads(1)
-    numbers = config_of(legs.of_robot(members[0]))
-    stage = legs.network.metadata["stage"]
-    task = Task(tuple(members), stage, numbers, "flat", see_ground=False, seed=seed)
+    plan = source.plan
+    of_plan = {"see_design": plan.see_design, "see_ground": plan.see_ground, "seed": seed}
+    task = Task(tuple(members), plan.stage, plan.config, "flat", **of_plan)
     settle = seconds * SETTLE / SECONDS
     trial = Trial(task, (), replicas * len(members), seconds, settle, seed=seed)
     sizes = np.array([_sizes(member) for member in members])  # (robots, 3)
@@ -181,7 +180,7 @@ def rolled_out(
             sums.add_(torch.cat((linear[:, :2], angular[:, 2:]), dim=1))
             errors.add_((linear[:, :2] - held[:, :2]).norm(dim=1))
 
-        measures = roll_out(env, by_slots(legs, "cpu")(env), trial, sample)
+        measures = roll_out(env, source.drive.actor("cpu")(env), trial, sample)
         fell = measures.fell.numpy().reshape(worlds)
         counts, _ = measures.samples(replicas, len(members))
     finally:

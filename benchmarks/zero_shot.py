@@ -1,4 +1,4 @@
-"""How well does the policy of all legs walk real robots that it has never seen?
+"""How well do the policies that ship walk real robots that they have never seen?
 
     python -m benchmarks.zero_shot                # robots of ../shared/robots, the shipped policy
     python -m benchmarks.zero_shot --robots DIR --policy FILE
@@ -7,7 +7,8 @@
 Each robot is its maker's: kinematics, masses, inertias, torques and speeds of the description, and
 the law's torques and speeds where it has a placeholder (`draft.validation.arms.by_maker`). It walks
 for 12 s at four commands, up to sqrt(g L) on four legs or more and half of it on two, from noisy
-starts, and is pushed while it walks. Some five minutes on two idle cores.
+starts, and is pushed while it walks: with the policy of all legs, and with that of all quadrupeds
+where it drives the robot, since Draft then uses it. Some eight minutes on two idle cores.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ from draft.laws.survey import read
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.bodies.slots import describe
 from draft.learn.engine.machine import cores
+from draft.learn.measuring.policies import Source, of_legs, open_source
 from draft.learn.policy.policy import ANY
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy
 from draft.learn.silence import quiet
@@ -54,6 +56,7 @@ MANIFEST = "manifest.csv"
 REPLICAS = 8
 UP, ERROR = 7 / 8, 0.10  # Least share that stays up, and largest error, of a robot that walks.
 FOUR, TWO = "quadrupeds", "bipeds and humanoids"
+FAMILY = "family"  # What a quadruped does with the policy of all quadrupeds.
 AT = {FOUR: 0.5, TWO: 0.25}  # Commands of the bars [sqrt(g L)].
 WALK = {FOUR: 0.9, TWO: 0.6}  # Shares of machines that are to walk.
 _KINDS = (".urdf", ".xml")
@@ -178,22 +181,32 @@ def measured(job: Job) -> dict[str, Any]:
         far = outside(legs, member)
     except DraftError as error:
         return row | {"reason": " ".join(error.problems[0].cause.split())}
-    cases = cases_of(len(member.feet))
-    found = rolled_out(legs, [member], cases, replicas=job.replicas, seconds=job.seconds)
-    fastest = max((i for i in range(4) if found.up(i) >= 0.5), default=None)
-    limit = None if fastest is None else found.limit(fastest)
-    if limit is not None and fastest is not None:
-        limit |= {"at": cases[fastest].name, "value": round(limit["value"], 3)}
-    return row | {
+    row |= {
         "legs": len(member.feet),
         "joints": len(member.joints),
         "leg_length": round(member.leg_length, 4),
         "mass": round(member.mass, 3),
-        "cases": cases_record(found),
-        "limit": limit,
+        **_walked(job, of_legs(legs, legs.file.name, member), member),
         **far,
         "notes": notes(twin),
     }
+    usual = open_source(robot=member)
+    if usual.of_any_legs:
+        return row
+    departures = [str(one) for one in usual.drive.departures(member)]
+    own = {"outside": len(departures), "farthest": departures[:_NAMED]}
+    return row | {FAMILY: _walked(job, usual, member) | own}
+
+
+def _walked(job: Job, source: Source, member: LeggedRobot) -> dict[str, Any]:
+    """What a robot does with a policy, and the joint nearest its limit."""
+    cases = cases_of(len(member.feet))
+    found = rolled_out(source, [member], cases, replicas=job.replicas, seconds=job.seconds)
+    fastest = max((i for i in range(4) if found.up(i) >= 0.5), default=None)
+    limit = None if fastest is None else found.limit(fastest)
+    if limit is not None and fastest is not None:
+        limit |= {"at": cases[fastest].name, "value": round(limit["value"], 3)}
+    return {"cases": cases_record(found), "limit": limit}
 
 
 def outside(legs: LegsPolicy, member: LeggedRobot) -> dict[str, Any]:
@@ -223,6 +236,11 @@ def walks(row: Mapping[str, Any], at: float) -> bool:
     return bool(one["up"] >= UP and one["error"] <= ERROR)
 
 
+def as_used(row: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What a robot does with the policy that Draft uses for its legs."""
+    return row | row.get(FAMILY, {})
+
+
 def group_of(row: Mapping[str, Any]) -> str:
     """Group that a measured robot counts in."""
     return TWO if row["legs"] == 2 else FOUR
@@ -242,6 +260,10 @@ def bars(found: Mapping[str, Any]) -> list[dict[str, Any]]:
         share = sum(walks(row, at) for row in of) / len(of) if of else None
         what = f"{len(of)} real {group}, walk at {at:g} sqrt(g L)"
         rows.append(bar(what, share, WALK[group], "%"))
+        if any(FAMILY in row for row in of):
+            share = sum(walks(as_used(row), at) for row in of) / len(of)
+            what = "the same, by the policy that Draft uses for their legs"
+            rows.append(bar(what, share, WALK[group], "%"))
     return rows
 
 
@@ -280,18 +302,35 @@ def _limit(row: Mapping[str, Any]) -> str:
 
 
 def _region(row: Mapping[str, Any]) -> str:
+    """How far outside the region, of the family the number of its numbers that are."""
+    if isinstance(row["outside"], int):
+        count = row["outside"]
+        return f"{count} of its numbers outside" if count else "inside"
     return f"{row['outside']:.2f} outside" if row["outside"] else "inside"
+
+
+def tables(found: Mapping[str, Any]) -> dict[str, tuple[str, list[Mapping[str, Any]]]]:
+    """Titles of the tables, with the group and the rows of each."""
+    done = [row for row in found["robots"] if "reason" not in row]
+    named = {}
+    for group in AT:
+        rows = [row for row in done if group_of(row) == group]
+        named[group] = group, rows
+        named[f"{group}, by the policy of all quadrupeds"] = (
+            group,
+            [as_used(row) for row in rows if FAMILY in row],
+        )
+    return {title: table for title, table in named.items() if table[1]}
 
 
 def show(found: Mapping[str, Any], console: Console) -> None:
     """Print the tables, and what was not measured."""
-    for group in AT:
-        own = [row for row in found["robots"] if "reason" not in row and group_of(row) == group]
-        table = Table(*columns(group), box=None, title=f"{group}: up / error per sqrt(g L)")
-        for row in own:
-            table.add_row(*(cell(row) for cell in columns(group).values()))
-        if own:
-            console.print(table)
+    for title, (group, rows) in tables(found).items():
+        cells = columns(group)
+        table = Table(*cells, box=None, title=f"{title}: up / error per sqrt(g L)")
+        for row in rows:
+            table.add_row(*(cell(row) for cell in cells.values()))
+        console.print(table)
     for row in found["robots"]:
         if "reason" in row:
             console.print(line(row), highlight=False, soft_wrap=True)

@@ -256,12 +256,9 @@ def _table(columns: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> lis
 
 def _robots(real: Mapping[str, Any]) -> list[str]:
     lines = []
-    for group in zero_shot.AT:
-        rows = [row for row in real["robots"] if "reason" not in row]
-        rows = [row for row in rows if zero_shot.group_of(row) == group]
-        if rows:
-            title = f"### {group[0].upper()}{group[1:]}"
-            lines += [title, "", *_table(zero_shot.columns(group), rows), ""]
+    for title, (group, rows) in zero_shot.tables(real).items():
+        heading = f"### {title[0].upper()}{title[1:]}"
+        lines += [heading, "", *_table(zero_shot.columns(group), rows), ""]
     noted = [row for row in real["robots"] if row.get("notes")]
     lines += [f"- {row['robot']}: {'; '.join(row['notes'])}." for row in noted]
     return [*lines, ""] if noted else lines

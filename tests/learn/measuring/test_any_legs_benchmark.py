@@ -16,6 +16,7 @@ from benchmarks.roll_outs import Case, rolled_out
 from draft.learn.bodies.generated import KINDS, generate_kind
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.bodies.slots import slots_of
+from draft.learn.measuring.policies import of_legs
 from draft.learn.policy.onnx_file import of_layers
 from draft.learn.policy.reduced import LegsPolicy
 from draft.learn.policy.reduced import any_legs as any_legs_policy
@@ -34,7 +35,8 @@ def legs() -> LegsPolicy:
 def test_robots_of_other_sizes_are_asked_by_their_own(legs: LegsPolicy) -> None:
     members = generate_kind("quadruped", 2, seed=5).members
     cases = (Case.ahead(0.5), Case("sideways", (0.0, 0.2, 0.0)), Case("turn", (0.0, 0.0, 0.3)))
-    found = rolled_out(legs, members, cases, replicas=2, seconds=1.0)
+    source = of_legs(legs, "legs", members[0])
+    found = rolled_out(source, members, cases, replicas=2, seconds=1.0)
     assert found.fell.shape == (3, 2, 2)
     assert found.up(0) == 1.0
     for i, error in enumerate((0.5, 0.2, 0.0)):
@@ -49,7 +51,8 @@ def test_robots_of_other_sizes_are_asked_by_their_own(legs: LegsPolicy) -> None:
 def test_a_strong_push_makes_robots_fall(legs: LegsPolicy) -> None:
     member = legged_robot(draft.load("quadruped").resolve())
     cases = (Case("stand", (0.0, 0.0, 0.0)), Case("push", (0.0, 0.0, 0.0), 5.0))
-    found = rolled_out(legs, [member], cases, replicas=4, seconds=2.0)
+    source = of_legs(legs, "legs", member)
+    found = rolled_out(source, [member], cases, replicas=4, seconds=2.0)
     assert found.up(0) > found.up(1)
     assert not found.fell[0].any()
 
@@ -65,6 +68,13 @@ def test_a_makers_robot_is_measured_and_another_file_is_told(
     assert list(row["cases"]) == ["0", "0.25", "0.5", "1", "push"]
     assert (row["outside"] > 0) == bool(row["farthest"])
     assert zero_shot.line(row).startswith("robot: vendor, legs: 4, joints: 12, 0: ")
+    # Draft walks it with the policy of all quadrupeds, which stays up, and does not stand still.
+    used = zero_shot.as_used(row)
+    assert used["cases"] == row["family"]["cases"] != row["cases"]
+    assert [*zero_shot.tables({"robots": [row]})] == [
+        "quadrupeds",
+        "quadrupeds, by the policy of all quadrupeds",
+    ]
     nothing = tmp_path / "none.urdf"
     nothing.write_text("<robot name='none'/>")
     row = zero_shot.measured(replace(job, entry=zero_shot.Entry("none", nothing)))

@@ -101,12 +101,12 @@ def open_source(
         family = open_policy(FAMILY)
         if robot is None or not isinstance(match_of(family, robot), str):
             return _of_file(family, FAMILY_NAME)
-        return _of_legs(any_legs(), ANY_NAME, robot)
+        return of_legs(any_legs(), ANY_NAME, robot)
     path = Path(name)
     if path.suffix == ".onnx" and not is_run(path):
         opened = open_any(path)
         if isinstance(opened, LegsPolicy):
-            return _of_legs(opened, str(path), robot)
+            return of_legs(opened, str(path), robot)
         return _of_file(opened, str(path), blind)
     return of_run(open_run(path), blind, robot)
 
@@ -149,7 +149,7 @@ def of_run(run: Run, blind: bool = False, robot: LeggedRobot | None = None) -> S
     if plan.mixed:
         from draft.learn.training.ppo.legs_onnx import legs_of
 
-        return _of_legs(legs_of(run), str(run.folder), robot)
+        return of_legs(legs_of(run), str(run.folder), robot)
     iteration, file = run.checkpoint()
     if not plan.see_design and not blind:
         cause = f"the policy of {run.folder} does not see its design"
@@ -189,7 +189,17 @@ def _of_file(policy: Policy, name: str, blind: bool = False) -> Source:
     return _with_drive(policy, name, drive)
 
 
-def _of_legs(policy: LegsPolicy, name: str, robot: LeggedRobot | None) -> Source:
+def of_legs(policy: LegsPolicy, name: str, robot: LeggedRobot | None) -> Source:
+    """Return the policy of all legs for robots with the joints of one.
+
+    Args:
+        policy: the policy.
+        name: what it is called.
+        robot: the robot.
+
+    Raises:
+        DraftError: no robot is named, or a leg of it has more joints than there are slots.
+    """
     if robot is None:
         cause = f"{name} is a policy of all legs, and what it can do depends on the robot"
         raise DraftError(cause, "name a robot")
