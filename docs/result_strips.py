@@ -10,7 +10,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from draft.learn.policy.policy import SKILLS, designs
+from draft.learn.policy.policy import STUDIED, designs
 from draft.study.report.figures import shrink
 from draft.study.report.sections import STRIPS
 
@@ -23,7 +23,7 @@ def main(results: Path) -> None:
     folder = results / STRIPS
     folder.mkdir(parents=True, exist_ok=True)
     for design in designs():
-        for skill in SKILLS:
+        for skill in STUDIED:
             strip = folder / f"{design}-{skill}.png"
             with tempfile.TemporaryDirectory() as scratch:
                 outputs = ("--out", f"{scratch}/play.mp4", "--strip", str(strip))

@@ -16,7 +16,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from draft.files import write
-from draft.learn.policy.policy import FAMILIES, FOLDER, SKILLS
+from draft.learn.policy.policy import FAMILIES, FOLDER, STUDIED
 from draft.learn.training.ppo.onnx import export
 from draft.learn.training.run import is_run, open_run
 from draft.learn.watching.play import Player
@@ -31,14 +31,17 @@ def main(folder: Path) -> None:
     A design of a study that is not through is left out.
     """
     if is_run(folder):
-        skill = next(k for k, stage in SKILLS.items() if stage == open_run(folder).plan.stage)
+        plan = open_run(folder).plan
+        skill = next(skill for skill, stage in STUDIED.items() if stage == plan.stage)
+        if not plan.config.observations.linear_velocity:
+            skill = "machine"
         _ship(folder, FAMILIES[skill])
         return
     study = read(folder)
     for design in study.titles:
         seed = median_seed(study, design)
         name = study.titles[design]
-        runs = {skill: folder / "runs" / f"{name}-{SKILLS[skill]}-{seed}" for skill in SKILLS}
+        runs = {skill: folder / "runs" / f"{name}-{STUDIED[skill]}-{seed}" for skill in STUDIED}
         lacking = [skill for skill, run in runs.items() if not _done(run)]
         if lacking:
             print(f"{name}: seed {seed} has not learnt to {', '.join(lacking)} yet")

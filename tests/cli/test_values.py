@@ -21,7 +21,7 @@ SCREEN = "screen bear --vary thigh_length=0.2:0.3 --out s --n"
             for n in ("1.5", "many", "inf", "nan")
         ),
         *(
-            (f"{word} --skill fly", "Expected one of ('walk', 'run', 'climb', 'push').")
+            (f"{word} --skill fly", "Expected one of ('walk', 'run', 'climb', 'push', 'machine').")
             for word in ("play cheetah", "deploy cheetah --out x")
         ),
         ("import x.urdf --population None", "Expected one of ('humanoid', 'quadruped')."),

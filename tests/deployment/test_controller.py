@@ -20,7 +20,7 @@ from draft.design.references import open_design
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.policy.controller import Controller
 from draft.learn.policy.onnx_write import of_policy
-from draft.learn.policy.policy import FOLDER, Policy, designs, open_policy
+from draft.learn.policy.policy import FAMILIES, FOLDER, Policy, designs, has, open_policy
 from draft.learn.policy.validity import fit
 from draft.learn.policy.walk import Walk
 from tests.deployment.conftest import Written, body
@@ -33,7 +33,7 @@ onnx = pytest.importorskip("onnx")
 from onnx.reference import ReferenceEvaluator  # noqa: E402
 
 SHIPPED = [(name, skill) for name in designs() for skill in ("walk", "run", "push")]
-OTHERS = [("family", "run"), ("hexapod", "walk"), ("humanoid", "walk")]
+OTHERS = [("family", "run"), ("bear", "machine"), ("hexapod", "walk"), ("humanoid", "walk")]
 STEPS = 400  # Physics steps: 2 s.
 # As in tests/browser/test_walk.py: Draft's network is of single precision, which the order of sums
 # lets drift apart, and a robot that runs more so.
@@ -62,10 +62,10 @@ def exact(data: bytes) -> Any:
 
 def file_of(name: str, skill: str) -> bytes:
     """The policy as an ONNX file: the one that ships, or what that of all legs is for a robot."""
-    if name in designs():
+    if has(name, skill):
         return (FOLDER / f"{name}-{skill}.onnx").read_bytes()
-    if name == "family":
-        return (FOLDER / "family.onnx").read_bytes()
+    if name in ("family", *designs()):
+        return FAMILIES[skill].read_bytes()
     model = open_design(name).build()
     return of_policy(fit(model, skill).policy, legged_robot(model.design, model), (1.0, 1.0, 1.0))
 
@@ -160,7 +160,7 @@ def test_each_joint_of_mujoco_is_the_one_that_the_controller_means(
     model = made(tmp_path / "robot", shipped_quadruped, turned)
     found = fit(model)
     assert (found.policy.sign < 0).any()
-    folder = deploy(model.design, tmp_path / "controller").folder
+    folder = deploy(model.design, tmp_path / "controller", "walk").folder
     controller = Python(folder)
     machine = Machine(model, found, controller.own.names)
     own = Controller(found.policy, machine.model)

@@ -80,7 +80,8 @@ def test_past_steps_are_observed_as_in_drafts_own_runner(history: int, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("name", "skill"), [("cheetah", "walk"), ("family", "run"), ("hexapod", "walk")]
+    ("name", "skill"),
+    [("cheetah", "walk"), ("family", "run"), ("giraffe", "machine"), ("hexapod", "walk")],
 )
 def test_its_readme_says_what_every_entry_of_an_observation_is(
     name: str, skill: str, written: Written
@@ -90,7 +91,8 @@ def test_its_readme_says_what_every_entry_of_an_observation_is(
     at = 0
     for first, last, term, meaning, unit in rows:
         assert int(first) == at
-        assert (meaning, unit) == (TERMS[term].meaning, TERMS[term].unit)
+        present = meaning.partition("; the last 5 steps, the oldest first")[0]
+        assert (present, unit) == (TERMS[term].meaning, TERMS[term].unit)
         at = int(last) + 1
     controller = Python(folder).own
     assert [row[2] for row in rows] == controller.terms
@@ -138,13 +140,27 @@ def test_its_header_refuses_options_that_would_hide_what_is_not_finite(
 def test_the_velocity_is_an_input_that_the_robot_must_estimate(
     tmp_path: Path, command: Command
 ) -> None:
-    said = command("deploy cheetah --out", tmp_path / "walk").out
+    said = command("deploy cheetah --skill walk --out", tmp_path / "walk").out
     assert "\nestimated_base_lin_vel: no sensor gives it, so the robot must estimate it\n" in said
     text = readme(tmp_path / "walk")
     assert "**`estimated_base_lin_vel` is an input that no sensor gives" in text
     assert "Vector estimated_base_lin_vel" in (tmp_path / "walk/controller.hpp").read_text()
     assert "# PLACEHOLDER" in text
     assert "// PLACEHOLDER" in (tmp_path / "walk/main.cpp").read_text()
+
+
+def test_unless_a_skill_is_named_the_policy_needs_no_velocity(
+    tmp_path: Path, command: Command
+) -> None:
+    said = command("deploy giraffe --out", tmp_path / "giraffe").out
+    assert "estimated" not in said
+    assert "targets that arrive 0 to 20 ms late" in said
+    assert "estimated" not in readme(tmp_path / "giraffe")
+    # There is none for other legs.
+    assert deploy("hexapod", tmp_path / "hexapod").estimated == ("estimated_base_lin_vel",)
+    with pytest.raises(DraftError, match="no policy drives the joints of hexapod"):
+        deploy("hexapod", tmp_path / "none", skill="machine")
+    assert not (tmp_path / "none").exists()
 
 
 NO_ESTIMATE = """
@@ -250,7 +266,7 @@ def test_a_policy_that_sees_no_velocity_asks_for_none(tmp_path: Path) -> None:
 
 def test_what_a_policy_does_not_know_is_said(tmp_path: Path) -> None:
     design = open_design("cheetah")
-    (doubt,) = deploy(design, tmp_path / "walk").doubts
+    (doubt,) = deploy(design, tmp_path / "walk", "walk").doubts
     assert "trained without a delay" in doubt
     assert f"- {doubt}\n" in readme(tmp_path / "walk")
     file = policy_file(tmp_path / "late.onnx", design, delay=0.02)
@@ -265,7 +281,7 @@ def test_what_a_policy_does_not_know_is_said(tmp_path: Path) -> None:
 def test_a_policy_that_sees_the_ground_is_refused(tmp_path: Path, command: Command) -> None:
     said = command.refuses("deploy cheetah --skill climb --out", tmp_path / "climb")
     assert "the policy observes height_scan" in said
-    assert "walk, run and push do" in said
+    assert "walk, run, push and machine do" in said
     assert not (tmp_path / "climb").exists()
 
 

@@ -113,10 +113,10 @@ OwnPolicies = Annotated[
     ),
 ]
 ShippedSkill = Annotated[
-    Literal["walk", "run", "climb", "push"] | None,
+    Literal["walk", "run", "climb", "push", "machine"] | None,
     tyro.conf.arg(
-        metavar="{walk,run,climb,push}",
-        help="Which of the policies that ship.",
+        metavar="{walk,run,climb,push,machine}",
+        help="Which of the policies that ship; that for a machine observes what sensors give.",
         help_behavior_hint="(default: walk)",
     ),
 ]

@@ -20,7 +20,8 @@ from draft.learn.bodies.legged import legged_robot
 from draft.learn.policy import policy as shipped
 from draft.learn.policy.policy import Policy
 from draft.learn.policy.reduced import AnyPolicy, open_any
-from draft.learn.policy.validity import check_drives, fit
+from draft.learn.policy.validity import Fit, check_drives, fit
+from draft.model import Model
 from draft.model.folder import check_target, records, write_folder
 
 _COPIED = ("controller.py", "CMakeLists.txt")
@@ -60,13 +61,16 @@ def deploy(
         ['CMakeLists.txt', 'README.md', 'controller.hpp', 'controller.py']
         >>> found.estimated
         ('estimated_base_lin_vel',)
+        >>> draft.deploy("cheetah", "controller").estimated
+        ()
 
     Args:
         design: the robot, its name, or the ONNX file of a policy, whose robot is the one that it
             was trained with.
         out: folder of the controller, written atomically; a controller that Draft wrote there
             before is replaced.
-        skill: "walk", "run" or "push" of the policies that ship; None for "walk".
+        skill: "walk", "run", "push" or "machine" of the policies that ship; None for "machine",
+            which observes no velocity, or for "walk" where that does not drive the robot.
         policy: ONNX file of a policy of one's own; None for one that ships.
 
     Returns:
@@ -93,7 +97,7 @@ def deploy(
     check_target(folder, {*_COPIED, *_WRITTEN}, "controller")
     model = open_design(design).build()
     check_drives(own, model)
-    found = fit(model, skill or "walk", own)
+    found = _fitted(model, skill, own)
     terms = [name for name, _ in found.policy.terms]
     observations.check(terms)
     member = legged_robot(model.design, model)
@@ -109,6 +113,20 @@ def deploy(
     write_folder(folder, files | records(model))
     estimated = tuple(TERMS[name].estimated for name in terms if TERMS[name].estimated)
     return Deployed(folder, model.design.reference, found.policy, estimated, tuple(doubts))
+
+
+def _fitted(model: Model, skill: str | None, own: list[AnyPolicy]) -> Fit:
+    """Policy for a robot: of those that ship rather one that needs no velocity.
+
+    Raises:
+        DraftError: none drives it.
+    """
+    if skill is None and not own:
+        try:
+            return fit(model, "machine")
+        except DraftError:
+            skill = "walk"
+    return fit(model, skill or "walk", own)
 
 
 def _robot_of(policy: AnyPolicy) -> str:

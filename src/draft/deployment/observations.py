@@ -94,5 +94,5 @@ def check(terms: Sequence[str]) -> None:
             cause = f"the policy observes {name}: {why}"
             remedy = f"deploy a policy that observes only {', '.join(TERMS)}"
             if name in _REFUSED:
-                remedy += "; of those that ship, walk, run and push do"
+                remedy += "; of those that ship, walk, run, push and machine do"
             raise DraftError(cause, remedy)

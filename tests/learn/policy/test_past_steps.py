@@ -119,9 +119,9 @@ def test_it_is_where_another_training_of_the_same_observations_starts(
     train(made, 1, engine="native")
     other = plan(stage="push", ground="flat", see_ground=False)
     made = session.begin(tmp_path / "other", other, {}, str(file))
-    with pytest.raises(DraftError, match="does not fit") as caught:
+    with pytest.raises(DraftError, match="and this training base_lin_vel 3") as caught:
         train(made, 1, engine="native")
-    assert "same observations and layers" in str(caught.value)
+    assert "start from a policy that observes the velocity and no past" in str(caught.value)
 
 
 def test_a_policy_of_several_topologies_remembers_nothing(tmp_path: Path) -> None:

@@ -21,10 +21,10 @@ from draft.errors import DraftError
 from draft.learn.policy.controller import Controller
 from draft.learn.policy.play_options import Course
 from draft.learn.policy.playback import KICK_EVERY, Playback, Scenario, playback, usual
-from draft.learn.policy.policy import FAMILIES, SKILLS, Policy, designs, policy, scan_points
+from draft.learn.policy.policy import FAMILIES, STUDIED, Policy, designs, policy, scan_points
 from draft.learn.task.groups import Observations
 
-SHIPPED = [(design, skill) for design in designs() for skill in SKILLS]
+SHIPPED = [(design, skill) for design in designs() for skill in STUDIED]
 STILL = (0.0, 0.0, 0.0)
 MOST = 400_000  # Bytes of a shipped file.
 
@@ -63,7 +63,7 @@ def test_policies_are_shipped_of_these_designs_and_nothing_else() -> None:
 def test_a_shipped_policy_is_small_and_of_the_design_as_it_is_now(design: str, skill: str) -> None:
     found = draft.policy(design, skill)
     assert found.file.stat().st_size < MOST
-    assert found.stage == SKILLS[skill]
+    assert found.stage == STUDIED[skill]
     assert found.design == f"quadruped:{design}"
     built = draft.load("quadruped").resolve(design)
     drives: list[Any] = [built.actuators[str(joint.actuator)] for joint in built.joints.values()]
@@ -158,7 +158,7 @@ def test_kicks_come_at_their_time(cheetah: draft.Design) -> None:
 
 def test_each_stage_is_shown_by_what_it_taught() -> None:
     walk, run, climb, push = (
-        usual(policy("cheetah", skill), stage) for skill, stage in SKILLS.items()
+        usual(policy("cheetah", skill), stage) for skill, stage in STUDIED.items()
     )
     assert (walk.step, walk.kick) == (0.0, 0.0)
     assert run.command[0] > walk.command[0]

@@ -25,7 +25,7 @@ from draft.learn.engine.machine import NATIVE  # noqa: E402
 from draft.learn.policy.controller import Controller  # noqa: E402
 from draft.learn.policy.matching import match, structure_of  # noqa: E402
 from draft.learn.policy.playback import playback  # noqa: E402
-from draft.learn.policy.policy import Policy, open_policy  # noqa: E402
+from draft.learn.policy.policy import SKILLS, Policy, open_policy  # noqa: E402
 from draft.learn.policy.policy import policy as shipped_policy  # noqa: E402
 from draft.learn.policy.validity import fit  # noqa: E402
 from draft.learn.policy.walk import Walk  # noqa: E402
@@ -189,7 +189,7 @@ def test_a_hinge_in_place_of_a_wheel_is_not_driven_and_neither_is_the_reverse() 
 
 def test_policies_that_ship_refuse_driven_wheels_and_name_the_training() -> None:
     model = draft.load("wheeled").resolve().build()
-    for skill in ("walk", "run", "climb", "push"):
+    for skill in SKILLS:
         with pytest.raises(DraftError) as caught:
             fit(model, skill)
         (problem,) = caught.value.problems

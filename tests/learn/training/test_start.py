@@ -21,7 +21,7 @@ from draft.learn.measuring.policies import commanded, open_source  # noqa: E402
 from draft.learn.policy.matching import Match, match_of  # noqa: E402
 from draft.learn.policy.policy import FAMILY, Policy, open_policy  # noqa: E402
 from draft.learn.policy.sensed import with_inputs  # noqa: E402
-from draft.learn.task.recipes import LAPTOP  # noqa: E402
+from draft.learn.task.recipes import LAPTOP, RecipeName  # noqa: E402
 from draft.learn.training.options import SliceOptions, TrainOptions  # noqa: E402
 from draft.learn.training.ppo.ppo import action_std  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
@@ -228,10 +228,13 @@ def test_a_policy_that_can_run_is_tuned_in_a_quarter_of_the_iterations(tmp_path:
     assert again.plan == tuned.plan
 
 
+@pytest.mark.parametrize("recipe", ["tune", "machine"])
 @pytest.mark.parametrize("origin", [None, "scratch"])
-def test_nothing_is_tuned_from_nothing(origin: str | None, tmp_path: Path) -> None:
-    options = TrainOptions(stage="velocity", origin=origin, recipe="tune")
-    with pytest.raises(DraftError, match="recipe tune is for policies that can run") as caught:
+def test_nothing_is_tuned_from_nothing(
+    origin: str | None, recipe: RecipeName, tmp_path: Path
+) -> None:
+    options = TrainOptions(stage="velocity", origin=origin, recipe=recipe)
+    with pytest.raises(DraftError, match=f"recipe {recipe} starts from a policy") as caught:
         prepare("cheetah", tmp_path / "run", options)
     assert '`origin="family"`' in str(caught.value)
     assert not (tmp_path / "run").exists()

@@ -24,14 +24,15 @@ def policy(design: str | Design, skill: str = "walk") -> Policy:
 
     Args:
         design: the design or its name; a robot of your own by its folder.
-        skill: "walk", "run", "climb" or "push".
+        skill: "walk", "run", "climb", "push", or "machine": it walks, runs and survives kicks with
+            what sensors give.
 
     Raises:
         DraftError: there is no such design or skill, or no policy that ships drives its joints.
     """
     shipped.check_skill(skill)
     if isinstance(design, str):
-        if shipped.short(design) in shipped.designs():
+        if shipped.has(design, skill):
             return shipped.policy(design, skill)
         from draft.design.references import open_design
 

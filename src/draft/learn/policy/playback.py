@@ -17,7 +17,7 @@ from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.bodies.payload import model_spec
 from draft.learn.policy.controller import Controller
 from draft.learn.policy.play_options import Command, Course, PlaySettings
-from draft.learn.policy.policy import SKILLS, Policy, designs, short
+from draft.learn.policy.policy import SKILLS, Policy, check_skill, has
 from draft.learn.policy.policy import policy as shipped
 from draft.learn.policy.reduced import open_any
 from draft.learn.policy.scenery import dress
@@ -258,7 +258,7 @@ def play(
 
     Args:
         design: the robot, or its name.
-        skill: "walk", "run", "climb" or "push"; None for "walk".
+        skill: "walk", "run", "climb", "push" or "machine"; None for "walk".
         policy: an ONNX file that `draft play` wrote; None for a shipped policy.
         settings: fields of `PlaySettings`, by keyword.
 
@@ -287,7 +287,7 @@ def playback(
 
     Args:
         design: the robot.
-        skill: "walk", "run", "climb" or "push"; None for "walk", or what `own` was trained for.
+        skill: as of `play`; None for "walk", or what `own` was trained for.
         own: ONNX files to choose from; empty for the shipped policies.
         course: what the robot is asked to do.
         seed: seed of kicks and of joint offsets at the start.
@@ -298,8 +298,10 @@ def playback(
     Raises:
         DraftError: no policy drives the robot, or an argument is out of range.
     """
-    name, warning = short(design.reference), ""
-    if name in designs() and not own:
+    if skill is not None:
+        check_skill(skill)
+    name, warning = design.reference, ""
+    if has(name, skill or "walk") and not own:
         chosen = shipped(name, skill or "walk")
     else:
         model, policies = design.build(), [open_any(file) for file in own]

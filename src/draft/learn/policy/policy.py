@@ -18,14 +18,24 @@ from draft.learn.policy.onnx_file import Network, read
 from draft.learn.task.constants import CONTACT_TIME
 from draft.learn.task.scan import scan_points
 
-# Skills, and the stages of training that teach them.
-SKILLS = {"walk": "base", "run": "velocity", "climb": "terrain", "push": "push"}
+# Skills that studies compare, and the stages of training that teach them.
+STUDIED = {"walk": "base", "run": "velocity", "climb": "terrain", "push": "push"}
+# Policies for machines walk, run and survive kicks without the trunk's velocity.
+SKILLS = {**STUDIED, "machine": "velocity"}
 ROBOT = "quadruped"
 DESIGN = "design"  # Term of the observation that holds the features of the design.
 FOLDER = Path(__file__).parents[2] / "robots" / ROBOT / "policies"
-# Policies of all quadrupeds of a range: one that is blind, and one that sees the ground.
+# Policies of all quadrupeds of a range: one that is blind, one that sees the ground, and one for
+# machines.
 FAMILY, CLIMBING_FAMILY = FOLDER / "family.onnx", FOLDER / "family_climb.onnx"
-FAMILIES = {"walk": FAMILY, "run": FAMILY, "push": FAMILY, "climb": CLIMBING_FAMILY}
+MACHINE_FAMILY = FOLDER / "family_machine.onnx"
+FAMILIES = {
+    "walk": FAMILY,
+    "run": FAMILY,
+    "climb": CLIMBING_FAMILY,
+    "push": FAMILY,
+    "machine": MACHINE_FAMILY,
+}
 # The policy of all legs; see `draft.learn.policy.reduced`.
 ANY = FOLDER.parents[1] / "policies" / "any.onnx"
 _HISTORY = "observation_terms_history_length"
@@ -177,10 +187,10 @@ def policy(design: str, skill: str = "walk") -> Policy:
 
     Args:
         design: name of the design, such as "cheetah".
-        skill: "walk", "run", "climb" or "push".
+        skill: one of `SKILLS`.
 
     Raises:
-        DraftError: there is no such design or skill.
+        DraftError: there is no such design or skill, or it has no policy of its own for it.
     """
     check_skill(skill)
     name, shipped = short(design), designs()
@@ -188,12 +198,16 @@ def policy(design: str, skill: str = "walk") -> Policy:
         remedy = suggest(name, shipped, "designs with policies")
         remedy += "; train others with `draft.train`"
         raise DraftError(f"no policy of '{design}' is shipped", remedy)
-    file = FOLDER / f"{name}-{skill}.onnx"
-    if not file.is_file():
-        known = [skill for skill in SKILLS if (FOLDER / f"{name}-{skill}.onnx").is_file()]
-        cause = f"no policy of '{name}' that can {skill} is shipped"
+    if not has(name, skill):
+        known = [skill for skill in SKILLS if has(name, skill)]
+        cause = f"no policy of '{name}' for the skill {skill} is shipped"
         raise DraftError(cause, f"skills of {name}: {', '.join(known)}")
-    return open_policy(file)
+    return open_policy(FOLDER / f"{name}-{skill}.onnx")
+
+
+def has(design: str, skill: str) -> bool:
+    """Return whether a policy of a shipped design alone is shipped for a skill."""
+    return (FOLDER / f"{short(design)}-{skill}.onnx").is_file()
 
 
 def check_skill(skill: str) -> None:

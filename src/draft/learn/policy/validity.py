@@ -78,11 +78,12 @@ class Fit:
 def fit(model: Model, skill: str = "walk", policies: Sequence[AnyPolicy] = ()) -> Fit:
     """Return the policy whose region is nearest to a design.
 
-    The policy of all legs drives robots that no other one does. It has not learnt to climb.
+    The policy of all legs drives robots that no other one does. It has not learnt to climb, and
+    observes the velocity.
 
     Args:
         model: the robot; the filter may have refused it.
-        skill: "walk", "run", "climb" or "push".
+        skill: "walk", "run", "climb", "push" or "machine".
         policies: policies of one's own. Where one drives the robot, those that ship are not used.
 
     Raises:
@@ -322,7 +323,7 @@ def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
     """Shipped policies of a skill with their regions, those of one design first."""
     spec = load(shipped.ROBOT)
     found = []
-    for name in shipped.designs():
+    for name in (one for one in shipped.designs() if shipped.has(one, skill)):
         design = spec.resolve(name)
         model = design.build()
         robot = legged_robot(design, model)

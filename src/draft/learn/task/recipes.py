@@ -3,8 +3,9 @@
 `paper` is the published configuration, for a GPU: some hundred million steps per stage. `laptop`
 learns from a hundredth of them; it changes only the numbers below, each for the reason given.
 `tune` is `laptop` for policies that can run already, such as that of a family with one more body.
-`any` trains one policy for robots of any legs. `machine` is `laptop` for policies of real robots:
-they observe what an inertial sensor and encoders give, and meet a machine that is not the model.
+`any` trains one policy for robots of any legs. `machine` is for policies of real robots, which also
+start from one that can run: they observe what an inertial sensor and encoders give, and meet a
+machine that is not the model.
 """
 
 from __future__ import annotations
@@ -185,9 +186,9 @@ MACHINE = Recipe(
         "episodes.dry_friction": Change((0.0, 0.03), "gearboxes, cold and warm"),
         "velocity.pushed": Change(0.3, "one policy runs and survives kicks"),
         "learning.lessons": Change(80, "1 million steps: it runs as its teacher does"),
-        "learning.iterations_base": Change(400, "it learns to feel its velocity too"),
-        "learning.iterations_velocity": Change(400, "it learns to feel its velocity too"),
-        "learning.iterations_push": Change(400, "it learns to feel its velocity too"),
+        "learning.iterations_velocity": Change(300, "it learns to feel its velocity too"),
+        "learning.least_rate": Change(1e-4, "as small as the policy's change requires"),
+        "learning.entropy": Change(0.003, "it need not explore other gaits"),
     },
     LAPTOP.plane,
 )

@@ -31,7 +31,7 @@ from draft.errors import DraftError, counted, listed
 from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.bodies.legged import LeggedRobot, by_topology, check_family
-from draft.learn.policy.policy import ANY, CLIMBING_FAMILY, FAMILY
+from draft.learn.policy.policy import ANY, CLIMBING_FAMILY, FAMILY, MACHINE_FAMILY
 from draft.learn.task.config import Config, from_dict
 from draft.learn.task.stages import STAGES
 from draft.learn.task.terms import TERMS
@@ -45,7 +45,12 @@ if TYPE_CHECKING:
 
 FORMAT = 2
 # Names of the policies that ship, as those to start from.
-SHIPPED = {"any": ANY, "family": FAMILY, "family_climb": CLIMBING_FAMILY}
+SHIPPED = {
+    "any": ANY,
+    "family": FAMILY,
+    "family_climb": CLIMBING_FAMILY,
+    "family_machine": MACHINE_FAMILY,
+}
 RUN, RESUME, STATE = "run.json", "resume.pt", "state.json"
 _PACKAGES = (
     *("mjlab", "rsl-rl-lib", "torch"),

@@ -13,7 +13,7 @@ from draft.learn.bodies.generated import BODIES, generate, together
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.machine import devices
 from draft.learn.task.config import Config
-from draft.learn.task.recipes import ANY, RECIPES, TUNE, default
+from draft.learn.task.recipes import ANY, MACHINE, RECIPES, TUNE, default
 from draft.learn.training import session as training
 from draft.learn.training.options import TrainOptions
 from draft.learn.training.progress import Progress
@@ -122,9 +122,10 @@ def prepare(
     texts = {m.name: text for m, text in zip(family, found.texts, strict=True)}
     folder = Path(out) if out is not None else Path("runs") / _name(plan, given)
     nothing = options.origin in (None, training.SCRATCH) and not is_run(folder)
-    if options.recipe == TUNE.name and nothing:
-        cause = "recipe tune is for policies that can run, and there is none to start from"
-        raise DraftError(cause, 'add `stage="velocity"` `origin="family"`, or `origin=RUN`')
+    if options.recipe in (TUNE.name, MACHINE.name) and nothing:
+        cause = f"recipe {options.recipe} starts from a policy that can run, and none is named"
+        remedy = 'add `stage="velocity"` `origin="family"`, or `origin="any"` for other legs'
+        raise DraftError(cause, remedy)
     # Before anything is written.
     training.check_fits(plan, training.setting(plan, options))
     return training.begin(folder, plan, texts, options.origin)

@@ -33,7 +33,7 @@ from draft.study.report.tables import of_skill
 
 STRIPS = "strips"
 # Name of a policy by its stage, as in the file names of strips.
-WORDS = {stage: skill for skill, stage in policy.SKILLS.items()}
+WORDS = {stage: skill for skill, stage in policy.STUDIED.items()}
 TOY = "This is the toy of a study: it shows that all of it runs, and nothing about the designs."
 CURVES = (
     "Lines: medians over seeds. Shaded: from the least seed to the greatest. Dashed: the perturbed "
