@@ -194,7 +194,9 @@ def test_policies_that_ship_refuse_driven_wheels_and_name_the_training() -> None
             fit(model, skill)
         (problem,) = caught.value.problems
         assert problem.cause.startswith("no policy drives the joints of wheeled: ")
-        assert problem.remedy == "train one: draft train wheeled"
+        words = ', with `recipe="machine"`, from a policy that can run'
+        own = words if skill == "machine" else ""
+        assert problem.remedy == f"train one: draft train wheeled{own}"
 
 
 def test_other_motors_of_the_wheels_have_targets_of_their_own(policy: Policy) -> None:

@@ -27,6 +27,7 @@ from draft.learn.training.ppo.ppo import action_std  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.warm_start import ALONE  # noqa: E402
 from draft.learn.training.progress import PROGRESS, fastest  # noqa: E402
+from draft.learn.training.session import origin_line  # noqa: E402
 from draft.learn.training.train import prepare  # noqa: E402
 from tests.learn.policy.test_matching import LEGS, SIGNS, made, tree  # noqa: E402
 from tests.learn.runs import QUICK, exported, train, trained, weights  # noqa: E402
@@ -174,6 +175,21 @@ def test_an_actor_imitates_the_policy_that_it_starts_from(tmp_path: Path) -> Non
     assert alg.teacher is None
     assert lost[-1] == 0.0
     assert not torch.equal(action_std(alg.actor).detach(), noise)
+
+
+def test_what_is_imitated_is_said_before(tmp_path: Path) -> None:
+    def line(**values: Any) -> str | None:
+        name = f"run {len([*tmp_path.iterdir()])}"
+        of = plan(stage="push", values=HIDDEN | values, **FLAT)
+        run = learn.begin(tmp_path / name, of, {}, "family")
+        return origin_line(run.plan, tmp_path)
+
+    usual = line(**{"learning.lessons": 12})
+    assert usual == f"starts from family, policy: iteration {open_policy(FAMILY).iterations}"
+    assert (
+        line(**SENSED | {"learning.lessons": 12}) == f"{usual}, which it imitates for 12 iterations"
+    )
+    assert line(**SENSED) == usual
 
 
 def test_a_teacher_acts_by_what_the_critic_observes(tmp_path: Path) -> None:

@@ -45,6 +45,8 @@ FAMILY_NAME, ANY_NAME = f"the family of {shipped.ROBOT}s", "any legs"
 # Factor by which a design may have more friction than the training, where motors lost about 1 % of
 # their torque to it; the cheetah then still walks at five sixths of its speed.
 _FAR = 5.0
+# How a policy of a skill is trained, where not by the command alone.
+_RECIPES = {"machine": ', with `recipe="machine"`, from a policy that can run'}
 _OF_ANY_LEGS = ("walk", "run", "push")  # Skills of the policy of all legs.
 
 
@@ -136,7 +138,7 @@ def fits(
         except (DraftError, IndexError) as error:
             if isinstance(error, DraftError):
                 reason = error.problems[0].cause
-            remedy = f"train one: {train_command(undriven.design)}"
+            remedy = f"train one: {train_command(undriven.design)}{_RECIPES.get(skill, '')}"
             raise DraftError(f"{_undriven(undriven)}: {reason}", remedy) from None
     policy, region, rows = min(
         found, key=lambda one: sum(gap.size for _, outside in one[2] for gap in outside)

@@ -15,6 +15,7 @@ from draft.learn.bodies.legged import check_family
 from draft.learn.engine import machine
 from draft.learn.engine.machine import KINDS, NATIVE, Engine
 from draft.learn.policy.reduced import LegsPolicy, open_for, open_legs_policy
+from draft.learn.policy.sensed import VELOCITY
 from draft.learn.policy.validity import check_policy
 from draft.learn.silence import quiet
 from draft.learn.task.constants import JOINTS
@@ -249,8 +250,21 @@ def origin_line(plan: Plan, beside: Path) -> str | None:
         return None
     source = origin.folder(beside)
     if origin.policy_file is not None or not is_run(source):
-        return f"starts from {origin.run}, policy: iteration {origin.iteration}"
+        line = f"starts from {origin.run}, policy: iteration {origin.iteration}"
+        return line + _imitated(plan, origin.policy_file)
     return f"starts from {source}, {open_run(source).policy_line(origin.iteration)}"
+
+
+def _imitated(plan: Plan, file: Path | None) -> str:
+    """Words on the lessons that a policy with other observations gives; "" for none."""
+    seen, lessons = plan.config.observations, plan.config.learning.lessons
+    if plan.mixed or not lessons or file is None or not file.is_file():
+        return ""
+    policy = open_for(file, plan.members)
+    known = VELOCITY in dict(policy.terms), max(policy.history)
+    if known == (seen.linear_velocity, seen.history):
+        return ""
+    return f", which it imitates for {counted(lessons, 'iteration')}"
 
 
 def finished(run: Run, options: SliceOptions) -> bool:
