@@ -204,6 +204,7 @@ def page(unseen: Mapping[str, Any], real: Mapping[str, Any], images: Sequence[st
             ).splitlines(),
             "",
             *_of_policy(unseen["policy"], real["policy"]),
+            *_used(real),
             "",
             "## What was asked of it",
             "",
@@ -237,6 +238,20 @@ def _of_policy(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]
         return [line]
     other = f"{second['iterations']} iterations, seed {second['seed']}"
     return [line, f"The real robots were measured with another one: {other}."]
+
+
+def _used(real: Mapping[str, Any]) -> list[str]:
+    """What real quadrupeds do with the policy that Draft uses for their legs."""
+    rows = [row for row in zero_shot.machines(real, zero_shot.FOUR) if zero_shot.FAMILY in row]
+    if not rows:
+        return []
+    cases = [one["up"] for row in rows for one in row[zero_shot.FAMILY]["cases"].values()]
+    up = number(sum(cases) / len(cases), "%")
+    return [
+        "",
+        "Quadrupeds of twelve joints Draft drives by the policy of all quadrupeds. With it,",
+        f"{len(rows)} real ones stay up in {up} of the roll-outs below.",
+    ]
 
 
 def _bars(rows: Sequence[Mapping[str, Any]]) -> list[str]:
