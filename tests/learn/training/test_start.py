@@ -292,6 +292,9 @@ def test_a_file_that_changed_since_is_not_taken(file: Path, tmp_path: Path) -> N
     copy.write_bytes(FAMILY.read_bytes())
     with pytest.raises(DraftError, match="has changed since"):
         Trainer(run, "cpu", engine=QUICK)
+    copy.unlink()
+    with pytest.raises(DraftError, match="has changed since"):
+        Trainer(run, "cpu", engine=QUICK)
 
 
 def test_a_robot_with_other_joints_starts_as_it_is_driven(tmp_path: Path) -> None:

@@ -81,8 +81,14 @@ class Trainer:
         self._alone = ALONE if file is not None else 0  # Iterations without rewards for the actor.
         self._saved = self._resume()
         self._first: tuple[Policy, Match] | None = None
-        begins = self.iteration < max(ALONE, plan.config.learning.lessons)
-        if plan.origin is not None and file is not None and not plan.mixed and begins:
+        lessons = plan.config.learning.lessons
+        taught = lessons > 0 and self.iteration < max(ALONE, lessons)
+        if (
+            plan.origin is not None
+            and file is not None
+            and not plan.mixed
+            and (taught or self._saved is None)
+        ):
             self._first = self._exported(plan.origin, file)
         if self._saved is None:
             self._turn()

@@ -14,11 +14,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from rsl_rl.algorithms import PPO
-from torch.nn import functional
 
 from draft.errors import DraftError
 from draft.learn.policy.matching import OF_JOINTS, Match
-from draft.learn.policy.onnx_file import read
+from draft.learn.policy.onnx_file import of_layers, read
 from draft.learn.policy.policy import Policy
 from draft.learn.policy.reduced import open_legs_policy
 from draft.learn.training.ppo.checkpoint import first_sentence, read_checkpoint
@@ -98,17 +97,10 @@ def teacher(policy: Policy, of_joints: Match) -> Callable[[torch.Tensor], torch.
         policy: the policy.
         of_joints: joints of the robot for those of the policy.
     """
-    mean, divisor, layers = _layers(policy, of_joints)
-    shift, scale = torch.tensor(mean), torch.tensor(divisor)
-    weights = [(torch.tensor(weight), torch.tensor(bias)) for weight, bias in layers]
+    network = of_layers(*_layers(policy, of_joints), {})
 
     def actions(seen: torch.Tensor) -> torch.Tensor:
-        values = (seen[:, : len(shift)] - shift.to(seen)) / scale.to(seen)
-        for i, (weight, bias) in enumerate(weights):
-            values = functional.linear(
-                functional.elu(values) if i else values, weight.to(seen), bias.to(seen)
-            )
-        return values
+        return torch.from_numpy(network(seen[:, : network.size].cpu().numpy())).to(seen)
 
     return actions
 
@@ -208,9 +200,9 @@ def check_unchanged(file: Path, origin: Origin) -> None:
     """Check that a file is the one of the run's plan.
 
     Raises:
-        DraftError: it is not.
+        DraftError: it is not, or is gone.
     """
-    if file_digest(file) != origin.digest:
+    if not file.is_file() or file_digest(file) != origin.digest:
         cause = f"{file} has changed since this run was created"
         raise DraftError(cause, "start a new run")
 
