@@ -46,8 +46,8 @@ class PolicyOptions(Settings):
         str | Path | None,
         Shown("POLICY", "scratch for base, else the base run beside it", "from"),
     ] = None
-    """Policy to start from: a run, an ONNX file, 'any' for the one of all legs that ships, 'family'
-    for that of all quadrupeds, or 'scratch' for none."""
+    """Policy to start from: a run, an ONNX file, or one that ships ('any' for all legs; 'family',
+    'family_climb' and 'family_machine' for all quadrupeds), or 'scratch' for none."""
     vary: Annotated[Vary, _ReadLater(), Shown("NAME=LOW:HIGH ...", "none")] = ()
     """Ranges, such as thigh_length=0.2:0.4, from which a number of bodies is drawn."""
     bodies: Annotated[int | None, Field(ge=1, le=4096), Shown("N", "none")] = None
