@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import draft
 from draft.design import loads
 from draft.design.crouch import CROUCH, leg_frames
-from draft.design.legs import legs
+from draft.design.legs import crouch, legs
 from draft.metrics import impact, of_design, statics
 from draft.model.model import TOLERANCE
 from draft.values import Array
@@ -45,8 +45,8 @@ def posed(model: draft.Model, home: bool = False) -> tuple[mujoco.MjData, dict[s
     data = mujoco.MjData(robot)
     data.qpos[:] = 0
     data.qpos[3] = 1
-    crouch = {x: joint.angle for kind in legs(design) for joint in kind.joints for x in joint.names}
-    angles = {name: joint.home for name, joint in design.joints.items()} if home else crouch
+    at_home = {name: joint.home for name, joint in design.joints.items()}
+    angles = at_home if home else crouch(design)
     for name, angle in angles.items():
         data.qpos[robot.joint(name).qposadr[0]] = angle
     mujoco.mj_forward(robot, data)

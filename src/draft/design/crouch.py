@@ -3,9 +3,11 @@
 All joints but three are at zero. The knee bends until the distance from hip to ankle is 0.878 of
 thigh plus shank, which is 1 rad if both have the same length (the default pose of arXiv
 2609.38405). The hip, the nearest hinge above with an axis parallel to that of the knee, turns until
-the ankle is below it. The ankle, the next parallel hinge below, makes the foot level again; without
-one the foot is the ankle. Of the two bending directions the knee takes the one closer to the middle
-of its range. Joint ranges are not checked otherwise.
+the ankle is below it; without one it is the nearest that is less than 60 degrees off, as in
+humanoids with slanting hips, and the other two hinges above the knee take back what it turns aside.
+The ankle, the next parallel hinge below the knee, makes the foot level again; without one the foot
+is the ankle. Of the two bending directions the knee takes the one closer to the middle of its
+range. Joint ranges are not checked otherwise.
 """
 
 from __future__ import annotations
@@ -38,6 +40,9 @@ from draft.values import (
 CROUCH = 0.878
 # Axes count as parallel above this |cosine| of the angle between them: 18 degrees.
 PARALLEL = 0.95
+SLANTING = 0.5  # |cosine| for a hip without a parallel axis: 60 degrees.
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_STEPS, _FLAT = 5, 0.1  # Newton's steps, and the volume of three axes below which none is taken.
 
 
 def tip(body: Body, frame: Frame) -> Vector:
@@ -50,7 +55,8 @@ class Crouch:
     """Crouch of a leg, computed in the plane in which its knee moves.
 
     In that plane a direction is an angle from straight down. `hip` and `ankle` map each candidate
-    joint to 0 where it is not that joint, and to the sense of its axis where it is.
+    joint to 0 where it is not that joint, and else to how much it turns per turn in the plane:
+    1 or -1, the sense of its axis, or more for a slanting one.
     """
 
     def __init__(self, design: Design, run: tuple[int, ...], knee: int) -> None:
@@ -62,7 +68,7 @@ class Crouch:
         last = tip(design.bodies[run[-1]], frames[run[-1]])
         origin = {k: frames[k][0] for k in hinges}
         hip, self.hip = _nearest(hinges[:at][::-1], axis, origin, axis[knee], first)
-        ankle, self.ankle = _nearest(hinges[at + 1 :], axis, origin, axis[knee], last)
+        ankle, self.ankle = _nearest(hinges[at + 1 :], axis, origin, axis[knee], last, PARALLEL)
         down, forth = _basis(axis[knee])
         u, v = g.subtract(origin[knee], hip), g.subtract(ankle, origin[knee])
         ux, uy, vx, vy = g.dot(u, down), g.dot(u, forth), g.dot(v, down), g.dot(v, forth)
@@ -84,7 +90,14 @@ class Crouch:
         turned: Value = turn
         for k, share in self.hip.items():
             self.angles[k] = share * lean
-            turned = turned + share * share * lean
+            turned = turned + where(share != 0, lean, 0.0)
+        slants = _slants(self.hip)
+        if some(slants) and at == len(_AXES):
+            above = hinges[:at]
+            start = [self.angles.get(k, 0.0) for k in above]
+            upright = _turned([axis[k] for k in above], start, axis[knee], lean)
+            for k, before, angle in zip(above, start, upright, strict=True):
+                self.angles[k] = where(slants, angle, before)
         for k, share in self.ankle.items():
             self.angles[k] = -1.0 * share * turned
 
@@ -107,24 +120,66 @@ def _nearest(
     origin: Mapping[int, Vector],
     to: Vector,
     otherwise: Vector,
+    least: float = SLANTING,
 ) -> tuple[Vector, dict[int, Value]]:
     """Origin of the first joint with a parallel axis, and which joint that is, design by design.
 
-    Joints that are the first one in no design are omitted.
+    Without a parallel one, it is the first that is within `least`, a |cosine|. Joints that are the
+    first one in no design are omitted.
     """
     point, found = otherwise, False
     chosen: dict[int, Value] = {}
     done: Mask = found
-    for k in joints:
-        cosine = g.dot(axis[k], to)
-        take = both(abs(cosine) > PARALLEL, negate(done))
-        if not some(take):
-            continue
-        x, y = origin[k], point
-        point = (where(take, x[0], y[0]), where(take, x[1], y[1]), where(take, x[2], y[2]))
-        chosen[k] = where(take, where(cosine > 0, 1.0, -1.0), 0.0)
-        done = either(done, take)
+    for enough in (PARALLEL, least):
+        for k in joints:
+            cosine = g.dot(axis[k], to)
+            take = both(abs(cosine) > enough, negate(done))
+            if not some(take):
+                continue
+            x, y = origin[k], point
+            point = (where(take, x[0], y[0]), where(take, x[1], y[1]), where(take, x[2], y[2]))
+            share: Value = where(cosine > 0, 1.0, -1.0)
+            if enough < PARALLEL:
+                share = divide(1.0, cosine)
+            chosen[k] = where(take, share, chosen.get(k, 0.0))
+            done = either(done, take)
     return point, chosen
+
+
+def _slants(hip: Mapping[int, Value]) -> Mask:
+    """Where a hip's axis is not parallel to that of the knee."""
+    slants: Mask = False
+    for share in hip.values():
+        slants = either(slants, abs(share) > 1.0)
+    return slants
+
+
+def _turned(axes: list[Vector], start: list[Value], to: Vector, lean: Value) -> list[Value]:
+    """Angles of three hinges in a row that together turn by `lean` about an axis, by Newton.
+
+    Args:
+        axes: of the hinges with all at zero, from the trunk outwards.
+        start: angles near the solution [rad].
+        to: the axis.
+        lean: angle of the whole turn [rad].
+    """
+    target, angles = g.about(to, lean), start
+    for _ in range(_STEPS):
+        rotation: Rotation = None
+        now = []
+        for axis, angle in zip(axes, angles, strict=True):
+            now.append(g.rotate(rotation, axis))
+            rotation = g.compose(rotation, g.about(axis, angle))
+        missing = g.ZERO  # Rotation vector from here to the target, twice its sine.
+        for axis in _AXES:
+            missing = g.add(missing, g.cross(g.rotate(rotation, axis), g.rotate(target, axis)))
+        x, y, z = now
+        volume = g.dot(x, g.cross(y, z))
+        share = where(abs(volume) > _FLAT, divide(0.5, volume), 0.0)
+        normals = g.cross(y, z), g.cross(z, x), g.cross(x, y)
+        steps = (share * g.dot(missing, normal) for normal in normals)
+        angles = [angle + step for angle, step in zip(angles, steps, strict=True)]
+    return angles
 
 
 def leg_frames(

@@ -35,8 +35,10 @@ class LegJoint:
     Attributes:
         body: index of the body that it turns.
         names: its full name on every leg of this kind.
+        senses: on every leg, 1 or -1: the motion of the first leg or its mirror image is that of
+            the angle times this.
         actuator: its actuator; None for a passive joint.
-        angle: its angle [rad].
+        angle: its angle on the first leg [rad].
         lift: upward motion of the foot per angle [m/rad].
         sweep: forward motion of the foot per angle [m/rad].
         hang: first moment of all bodies that it moves, sum of m dz/dq [kg m/rad].
@@ -44,6 +46,7 @@ class LegJoint:
 
     body: int
     names: tuple[str, ...]
+    senses: tuple[Value, ...]
     actuator: Actuator | None
     angle: Value
     lift: Value
@@ -95,6 +98,16 @@ class Leg:
 def legs(design: Design) -> tuple[Leg, ...]:
     """Kinds of leg of a design; empty without legs."""
     return tuple(_leg(design, runs) for runs in runs_of_legs(design))
+
+
+def crouch(design: Design) -> dict[str, Value]:
+    """Angles of all hinges of the legs in the crouch, by full name [rad]."""
+    return {
+        name: sense * joint.angle
+        for leg in legs(design)
+        for joint in leg.joints
+        for name, sense in zip(joint.names, joint.senses, strict=True)
+    }
 
 
 def count(design: Design) -> int:
@@ -225,6 +238,7 @@ def _joints(
             LegJoint(
                 body=k,
                 names=tuple(bodies[other[place]].prefix + joint.name for other in runs),
+                senses=tuple(_sense(design, k, other[place]) for other in runs),
                 actuator=design.drive(joint),
                 angle=angles.get(k, 0.0),
                 lift=axis[0] * r[1] - axis[1] * r[0],
@@ -233,6 +247,19 @@ def _joints(
             )
         )
     return tuple(found)
+
+
+def _sense(design: Design, first: int, other: int) -> Value:
+    """Sign of the angle with which a hinge moves like that of another leg, or like its image.
+
+    In a mirror an axis becomes minus its reflection, and a copy has that or its opposite.
+    """
+    side, own = (design.spec.bodies[k].signs[1] for k in (first, other))
+    if side == own:
+        return 1.0
+    axis, copied = (design.bodies[k].joint_axis for k in (first, other))
+    along = g.dot(copied, g.reflect(axis, (1.0, -1.0, 1.0)))
+    return where(along > 0, -1.0, 1.0)
 
 
 def _follows(body: Body) -> bool:
@@ -251,6 +278,7 @@ def held_joints(design: Design) -> tuple[LegJoint, ...]:
         LegJoint(
             body=k,
             names=(body.prefix + joint.name,),
+            senses=(1.0,),
             actuator=design.drive(joint),
             angle=joint.home,
             lift=0.0,

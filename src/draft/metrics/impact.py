@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from draft.design.cached import once
-from draft.design.legs import legs
+from draft.design.legs import crouch, legs
 from draft.design.limbs import limbs
 from draft.geometry import Vector
 from draft.metrics.registry import metric
@@ -187,9 +187,8 @@ def _apparent(inertia: Array, rows: Array) -> Array:
 def crouch_inertia(model: Model | ModelBatch) -> CrouchInertia:
     """M(q) and the vertical motion of the feet in the crouch."""
     design = model.design
-    angles = {name: j.angle for leg in legs(design) for j in leg.joints for name in j.names}
     feet = [design.bodies[foot] for leg in legs(design) for foot in leg.feet]
-    found = pose_inertia(model, angles, [(body.name, body.link.tip) for body in feet])
+    found = pose_inertia(model, crouch(design), [(body.name, body.link.tip) for body in feet])
     rows = {body.name: found.jacobians[:, i, 2] for i, body in enumerate(feet)}
     return CrouchInertia(found.inertia, rows, found.armature)
 

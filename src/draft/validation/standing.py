@@ -14,7 +14,7 @@ import numpy as np
 
 import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.design import Design
-from draft.design.legs import GRAVITY, legs
+from draft.design.legs import GRAVITY, crouch, legs
 from draft.learn.bodies.legged import LeggedRobot
 from draft.values import Array, scalar
 
@@ -63,9 +63,10 @@ def standing(member: LeggedRobot, design: Design) -> Standing:
     for leg in kinds:
         for joint in leg.joints:
             for name in joint.names:
-                data.qpos[model.joint(name).qposadr[0]] = scalar(joint.angle)
                 if joint.actuator is not None:
                     driven[name] = joint.actuator
+    for name, angle in crouch(design).items():
+        data.qpos[model.joint(name).qposadr[0]] = scalar(angle)
     mujoco.mj_forward(model, data)
     mass = float(model.body_mass.sum())
     lift = np.zeros(model.nv)

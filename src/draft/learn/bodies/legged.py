@@ -17,7 +17,7 @@ import numpy as np
 
 from draft.design import Design
 from draft.design.battery import battery
-from draft.design.legs import legs
+from draft.design.legs import crouch, legs
 from draft.errors import DraftError
 from draft.laws.actuators import laws
 from draft.laws.limits import copper_loss
@@ -340,7 +340,7 @@ def _home(design: Design, name: str) -> tuple[float, ...]:
     """
     home = {joint: scalar(one.home) for joint, one in design.joints.items()}
     if not any(home.values()):
-        angles = {n: float(j.angle) for leg in legs(design) for j in leg.joints for n in j.names}
+        angles = {name: float(angle) for name, angle in crouch(design).items()}
         shares = (home | {n: share * x for n, x in angles.items()} for share in _SHARES)
         home = next((one for one in shares if _beyond(design, one) is None), home | angles)
     joint = _beyond(design, home)

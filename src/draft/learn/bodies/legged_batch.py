@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from draft import geometry as g
 from draft.design import Design
-from draft.design.legs import legs
+from draft.design.legs import crouch, legs
 from draft.errors import DraftError
 from draft.learn.bodies.legged import (
     LeggedRobot,
@@ -126,7 +126,7 @@ def _home(design: Design, first: LeggedRobot) -> Array | None:
         return stated
     if states.any():
         return None
-    angle = {name: j.angle for leg in legs(design) for j in leg.joints for name in j.names}
+    angle = crouch(design)
     return _table(design, [angle.get(name, 0.0) for name in first.joints])
 
 
