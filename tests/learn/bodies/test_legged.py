@@ -274,11 +274,15 @@ def test_a_wheel_with_a_tilted_axle_stands_on_its_rim(tilt: float) -> None:
     assert lowest_point(model, data, "wheel") == pytest.approx(points[:, 2].min(), abs=1e-6)
 
 
-def test_without_a_home_pose_legs_crouch_and_other_joints_stay_at_zero(tmp_path: Path) -> None:
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_legs_without_a_home_pose_crouch_and_other_joints_stay(
+    angle: float, tmp_path: Path
+) -> None:
     bare = ((", home: crouch / 2", ""), (", home: -crouch", ""))
-    found = legged_robot(changed(tmp_path / "robot", *bare, *arm()))
+    stated = ("range: [-1, 1], actuator: leg}", f"range: [-1, 1], actuator: leg, home: {angle}}}")
+    found = legged_robot(changed(tmp_path / "robot", *bare, *arm(), stated))
     home = dict(zip(found.joints, found.home, strict=True))
-    assert home["shoulder"] == 0.0
+    assert home["shoulder"] == angle
     assert home["FL_knee"] < -0.5
 
 

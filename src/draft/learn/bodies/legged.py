@@ -334,13 +334,13 @@ def check_family(members: Sequence[LeggedRobot]) -> None:
 
 
 def _home(design: Design, name: str) -> tuple[float, ...]:
-    """Home pose; if the spec gives none, the crouch, or a share of it that the ranges allow.
+    """Home pose; if the spec gives none to the legs, their crouch, or what the ranges allow of it.
 
     The feet stay level and nearly below the hips: all angles of a leg have the same share.
     """
     home = {joint: scalar(one.home) for joint, one in design.joints.items()}
-    if not any(home.values()):
-        angles = {name: float(angle) for name, angle in crouch(design).items()}
+    angles = {name: float(angle) for name, angle in crouch(design).items()}
+    if not any(home[name] for name in angles):
         shares = (home | {n: share * x for n, x in angles.items()} for share in _SHARES)
         home = next((one for one in shares if _beyond(design, one) is None), home | angles)
     joint = _beyond(design, home)

@@ -119,15 +119,12 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
 
 
 def _home(design: Design, first: LeggedRobot) -> Array | None:
-    """Joint angles of the home pose, shape (N, joints); None if only some designs state one."""
-    stated = _table(design, [design.joints[name].home for name in first.joints])
-    states = (stated != 0).any(axis=1)
-    if states.all():
-        return stated
-    if states.any():
+    """Angles of the home pose, shape (N, joints); None if only some designs state the legs'."""
+    stated, angles = {name: design.joints[name].home for name in first.joints}, crouch(design)
+    states = (_table(design, [stated[name] for name in angles]) != 0).any(axis=1)
+    if states.any() and not states.all():
         return None
-    angle = crouch(design)
-    return _table(design, [angle.get(name, 0.0) for name in first.joints])
+    return _table(design, list((stated if states.all() else stated | angles).values()))
 
 
 def _alike(design: Design, first_row: int, first: LeggedRobot) -> NDArray[np.bool_]:
