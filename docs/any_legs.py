@@ -57,17 +57,17 @@ limx_oli, adam_lite, agibot_x1): no body of the training has one."""
 INTRODUCTION = """\
 Draft ships one policy for robots of any legs: two, four or six of them, with three to six driven
 joints each. The shipped hexapod, biped and humanoid walk with it; of real robots, nine of ten
-quadrupeds stay up at half a sqrt(g L), and a third of the bipeds and humanoids. It observes and moves joints by their
-place, which is the side, the order from the front and the role in the leg, and is told torques,
-speeds, inertias and lengths of the body, all without units. For one robot that is an ordinary small
-network of its own joints, which NumPy runs in {ms} ms for {joints} joints. It has learnt on bodies
-that Draft draws, of five kinds in one run (`draft train any`), and has seen no real robot; but the
-widths of their draws were chosen anew after looking at how a first policy walked these real robots,
-so that they are no blind test. It was trained in parts: {first} iterations, of which most with a
-mistake in the code (a world that was given another body kept the home pose of the one before) and
-with a smaller reward for turning, and {second} more from there (`draft train any --from any`).
-Outside the ranges of these bodies, its region of validity, it takes the nearest numbers that it
-knows, says so and tries.
+quadrupeds stay up at half a sqrt(g L), and a third of the bipeds and humanoids at a quarter. It
+observes and moves joints by their place, which is the side, the order from the front and the role
+in the leg, and is told torques, speeds, inertias and lengths of the body, all without units. For
+one robot that is an ordinary small network of its own joints, which NumPy runs in {ms} ms for
+{joints} joints. It has learnt on bodies that Draft draws, of five kinds in one run (`draft train
+any`), and has seen no real robot; but the widths of their draws were chosen anew after looking at
+how a first policy walked these real robots, so that they are no blind test. It was trained in
+parts: {first} iterations, of which most with a mistake in the code (a world that was given another
+body kept the home pose of the one before) and with a smaller reward for turning, and {second} more
+from there (`draft train any --from any`). Outside the ranges of these bodies, its region of
+validity, it takes the nearest numbers that it knows, says so and tries.
 
 In this page velocities are per sqrt(g L) and rates of turn per sqrt(g / L), with the leg length L.
 Roll-outs last {seconds:g} s from noisy starts, with the delays of the training and five times its
