@@ -44,17 +44,16 @@ REAL = ROOT / "examples/results/zero_shot.json"
 # Number of strips, shots of each, time that a robot walks [s], and sizes [pixels].
 PICTURES, SHOTS, SECONDS, SIZE, WIDTH = 12, 6, 4.0, (640, 360), 720
 _MASSES = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
+BEFORE = 3846  # Iterations of the trainings that the policy goes on from.
 # Why robots do not walk, by name, as found by looking at them.
 CAUSES: Mapping[str, str] = {}
-BEFORE = 3846  # Iterations of the trainings that the policy goes on from.
 WHY = """\
 The training was ended by the clock, while robots still learnt to turn: until its last part they did
 not, as a reward for turning of 0.7 per second taught nothing in 2.4 million steps, and one of 2.5
 did in as many. Robots on two legs and those with five joints a leg, whose commands grew meanwhile,
-fall more often than by the policy before. Real robots that fall lie outside the numbers
-of the training, most by the torque or the speed of their ankles, or by a hip pitch whose axis
-slants by 25 to 45 degrees (unitree_h2, limx_oli, adam_lite, agibot_x1): no body of the training
-has one."""
+fall more often than by the policy before. Real robots that fall lie outside the numbers of the
+training, most by the torque or the speed of their ankles, or by a hip pitch whose axis slants by
+25 to 45 degrees (unitree_h2, limx_oli, adam_lite, agibot_x1): no body of the training has one."""
 INTRODUCTION = """\
 Draft ships one policy for robots of any legs: two, four or six of them, with three to six driven
 joints each. The shipped hexapod, biped and humanoid walk with it; of real robots, nine of ten

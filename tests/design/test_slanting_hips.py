@@ -13,6 +13,8 @@ import pytest
 import draft
 from draft.design.legs import crouch
 
+BIPED = Path(draft.__file__).parent / "robots/biped"
+
 
 def slanting(degrees: float, folder: Path) -> Path:
     """The shipped biped with hip pitch, roll and yaw in this order, and the pitch's axis slanting.
@@ -21,7 +23,7 @@ def slanting(degrees: float, folder: Path) -> Path:
         degrees: angle from the axis of the knee, in the plane of both hips [deg].
         folder: folder of its files.
     """
-    shutil.copytree(draft.load("biped").folder, folder, dirs_exist_ok=True)
+    shutil.copytree(BIPED, folder, dirs_exist_ok=True)
     y, z = math.cos(math.radians(degrees)), -math.sin(math.radians(degrees))
     file = folder / "tree.yaml"
     text = file.read_text(encoding="utf-8")
