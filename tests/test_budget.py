@@ -21,7 +21,7 @@ BUDGET = {
     "cli": 6_030,  # `--live` and `--python` of pages, and `deploy`.
     "deployment": 940,  # Controllers in C++ and Python; the policy for machines where it drives.
     "description": 2_330,
-    "design": 6_731,  # Parts in place of drawn solids; crouches of hips that slant.
+    "design": 6_727,  # Parts in place of drawn solids; crouches of hips that slant.
     "drawing": 70,
     "explore": 4_740,
     "fitting": 3_890,

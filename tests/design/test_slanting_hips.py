@@ -58,3 +58,21 @@ def test_feet_are_level_and_below_slanting_hips(degrees: float, tmp_path: Path) 
         assert abs(ankle.xanchor[0] - hip[0]) < 0.03
         assert out * ankle.xanchor[1] > 0
         assert hip[2] > knee.xanchor[2] > ankle.xanchor[2]
+
+
+def test_many_designs_crouch_as_each_alone(tmp_path: Path) -> None:
+    """Also where some hips slant and others count as parallel."""
+    file = slanting(0, tmp_path) / "tree.yaml"
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace("[0, 1.0, -0.0]", "[0, 1, -slope]"), encoding="utf-8")
+    file = tmp_path / "parameters.yaml"
+    text, old = file.read_text(encoding="utf-8"), "  # derived"
+    new = "  slope: {value: 0, unit: 1, range: [0, 2], doc: Of the hip pitch's axis.}\n" + old
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    spec, slopes = draft.load(tmp_path), np.array([0.0, 0.2, 0.6, 1.4])
+    together = crouch(spec.resolve({"slope": slopes}))
+    for i, slope in enumerate(slopes):
+        alone = crouch(spec.resolve({"slope": slope}))
+        for name, angle in together.items():
+            assert np.broadcast_to(angle, len(slopes))[i] == pytest.approx(alone[name], abs=1e-12)
+    assert np.ptp(together["left_hip_roll"]) > 0.05

@@ -35,8 +35,6 @@ class LegJoint:
     Attributes:
         body: index of the body that it turns.
         names: its full name on every leg of this kind.
-        senses: on every leg, 1 or -1: the motion of the first leg or its mirror image is that of
-            the angle times this.
         actuator: its actuator; None for a passive joint.
         angle: its angle on the first leg [rad].
         lift: upward motion of the foot per angle [m/rad].
@@ -46,7 +44,6 @@ class LegJoint:
 
     body: int
     names: tuple[str, ...]
-    senses: tuple[Value, ...]
     actuator: Actuator | None
     angle: Value
     lift: Value
@@ -102,12 +99,13 @@ def legs(design: Design) -> tuple[Leg, ...]:
 
 def crouch(design: Design) -> dict[str, Value]:
     """Angles of all hinges of the legs in the crouch, by full name [rad]."""
-    return {
-        name: sense * joint.angle
-        for leg in legs(design)
-        for joint in leg.joints
-        for name, sense in zip(joint.names, joint.senses, strict=True)
-    }
+    found: dict[str, Value] = {}
+    for leg, runs in zip(legs(design), runs_of_legs(design), strict=True):
+        for joint in leg.joints:
+            place = runs[0].index(joint.body)
+            for name, run in zip(joint.names, runs, strict=True):
+                found[name] = _sense(design, joint.body, run[place]) * joint.angle
+    return found
 
 
 def count(design: Design) -> int:
@@ -238,7 +236,6 @@ def _joints(
             LegJoint(
                 body=k,
                 names=tuple(bodies[other[place]].prefix + joint.name for other in runs),
-                senses=tuple(_sense(design, k, other[place]) for other in runs),
                 actuator=design.drive(joint),
                 angle=angles.get(k, 0.0),
                 lift=axis[0] * r[1] - axis[1] * r[0],
@@ -278,7 +275,6 @@ def held_joints(design: Design) -> tuple[LegJoint, ...]:
         LegJoint(
             body=k,
             names=(body.prefix + joint.name,),
-            senses=(1.0,),
             actuator=design.drive(joint),
             angle=joint.home,
             lift=0.0,

@@ -151,7 +151,7 @@ def stretched(design: Design) -> Stretch | None:
 def _load(column: Column, angle: Value) -> Load:
     sweep, _, lift = column.arm
     names, actuator, hang = (column.name,), column.actuator, column.torque
-    joint = LegJoint(column.body, names, (1.0,), actuator, angle, lift, sweep, hang)
+    joint = LegJoint(column.body, names, actuator, angle, lift, sweep, hang)
     return Load(joint, actuator, GRAVITY * hang, GRAVITY * lift)
 
 
