@@ -23,6 +23,7 @@ from draft.learn.bodies.legged import (
     legged_robot,
     lowest_point,
 )
+from draft.learn.bodies.legged_batch import legged_robots
 from tests.helpers import wheeled
 from tests.learn.small import member
 
@@ -280,10 +281,15 @@ def test_legs_without_a_home_pose_crouch_and_other_joints_stay(
 ) -> None:
     bare = ((", home: crouch / 2", ""), (", home: -crouch", ""))
     stated = ("range: [-1, 1], actuator: leg}", f"range: [-1, 1], actuator: leg, home: {angle}}}")
-    found = legged_robot(changed(tmp_path / "robot", *bare, *arm(), stated))
+    design = changed(tmp_path / "robot", *bare, *arm(), stated)
+    found = legged_robot(design)
     home = dict(zip(found.joints, found.home, strict=True))
     assert home["shoulder"] == angle
     assert home["FL_knee"] < -0.5
+    lengths = np.array([0.22, 0.25])
+    many = draft.load(tmp_path / "robot").resolve({"thigh_length": lengths})
+    for row, one in legged_robots(many, np.arange(2)).items():
+        assert one.home == pytest.approx(legged_robot(many[row]).home, rel=1e-12)
 
 
 @pytest.mark.parametrize(("least", "share"), [(-2.8, 1.0), (-0.95, 0.9), (-0.55, 0.5)])
