@@ -152,7 +152,20 @@ def test_a_family_is_read() -> None:
         (TEXT.replace("seeds: 2", "seeds: [0, -1]"), "small.yaml:2:12: seeds[1]: expected a whole"),
         (TEXT.replace("seeds: 2", "seeds: [3, 3]"), "small.yaml:2:8: seeds: 3 is listed twice"),
         (TEXT.replace("seeds: 2", "seeds: []"), "seeds: expected at least 1 entry"),
-        (TEXT.replace("[base, push]", "[push, base]"), "'base' must come first"),
+        (TEXT.replace("[base, push]", "[push, base]"), "out of order; the order is base,"),
+        (
+            TEXT.replace("[base, push]", "[push]").replace("base: 3, ", ""),
+            "small.yaml:3:9: 'base' must come first: 'push' starts from it\n"
+            "  add 'base', or a policy that ships: start: {push: family}",
+        ),
+        (TEXT + "start: {terrain: family}\n", "small.yaml:7:9: stage 'terrain' is not trained"),
+        (TEXT + "start: {bse: family}\n", "small.yaml:7:9: start.bse: unknown value 'bse'"),
+        (TEXT + "start: {base: famly}\n",
+         "small.yaml:7:15: start.base: no policy that ships; they are any, family"),
+        (TEXT + "start: {base: 3}\n", "small.yaml:7:15: start.base: no policy that ships"),
+        (TEXT + "recipe: tune\n",
+         "small.yaml:7:9: recipe tune starts from a policy that can run: 'base' does not\n"
+         "  start: {base: family}"),
         (TEXT.replace("[base, push]", "[base, push, terrain]"), "out of order; the order is base,"),
         (TEXT.replace("[base, push]", "[base, base]"), "base is listed twice"),
         (TEXT.replace("[base, push]", "[base, jump]"), "small.yaml:3:16: stages[1]: unknown value"),

@@ -156,6 +156,43 @@ def test_a_policy_that_saw_the_ground_keeps_seeing_it(monkeypatch: pytest.Monkey
         assert (job.plan.ground, job.plan.see_ground) == (LAPTOP.ground(stage), True)
 
 
+def test_a_stage_may_start_from_a_policy_that_ships(tmp_path: Path) -> None:
+    text = TEXT.replace("base, push", "base, terrain, push").replace("environments: 4\n", "")
+    before = jobs(text + "recipe: laptop\n")
+    text += "recipe: tune\nstart: {base: family, terrain: family_climb}\n"
+    made = jobs(text)
+    base, terrain, push = (
+        training(made, f"bear-{stage}-0") for stage in ("base", "terrain", "push")
+    )
+    assert (base.needs, terrain.needs, push.needs) == ((), (), (base.name,))
+    assert base.plan.origin and base.plan.origin.run == "family"
+    assert terrain.plan.origin and terrain.plan.origin.run == "family_climb"
+    assert push.plan.origin is None
+    assert all(job.plan.see_design for job in (base, terrain, push))
+    assert (base.plan.see_ground, terrain.plan.see_ground) == (False, True)
+    assert all(made[name].key != job.key for name, job in before.items())
+    terrain.prepare(tmp_path)
+    run = runs.open_run(terrain.output(tmp_path))
+    assert run.plan == terrain.plan
+    assert terrain.holds(tmp_path, run.folder)
+    # Another policy under that name makes another run of it.
+    other = jobs(text.replace("family_climb", "family"))["bear-terrain-0"]
+    assert not other.holds(tmp_path, run.folder)
+
+
+def test_a_toy_keeps_the_layers_of_a_policy_that_it_starts_from() -> None:
+    text = TEXT + "recipe: tune\nstart: {base: family}\ntoy: {iterations: 1}\n"
+    toy = study(text, toy=True)
+    assert toy.config.learning.hidden == LAPTOP.config.learning.hidden
+    assert toy.config.learning.steps == 8
+    assert graph(toy, groups("bear"))["bear-base-0"].needs == ()
+
+
+def test_a_policy_that_does_not_fit_is_refused_where_it_is_named() -> None:
+    with pytest.raises(DraftError, match=r"small.yaml:7:15: .*has layers of 256, 128, 64 units"):
+        jobs(TEXT + "start: {base: family}\n")
+
+
 def test_inertia_errors_are_those_of_the_perturbed_arm(tmp_path: Path) -> None:
     made = jobs(TEXT.replace("levels: 2", "levels: 2, errors: paper"))
     for arm, errors in (("perturbed", "paper"), ("nominal", None)):

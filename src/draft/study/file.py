@@ -23,9 +23,10 @@ from draft.errors import DraftError, Location, Problem, SpecError
 from draft.laws.residuals import ErrorSource
 from draft.learn.measuring.evaluation_options import RollOuts
 from draft.learn.task.config import Config
-from draft.learn.task.recipes import RECIPES
+from draft.learn.task.recipes import RECIPES, TUNE
 from draft.learn.task.stages import PUBLISHED, STAGES, StageName
 from draft.learn.training.options import TaskOptions, TrainOptions
+from draft.learn.training.run import SHIPPED
 from draft.settings import expected
 from draft.spec.field_types import unknown_keys
 from draft.spec.load import validate
@@ -74,15 +75,17 @@ def _unique(values: list[_T]) -> list[_T]:
 def _stages(values: object) -> object:
     if isinstance(values, list) and all(value in STAGES for value in values):
         _unique(values)
-        for stage in values:
-            origin = STAGES[stage].origin
-            if origin not in (None, *values[: values.index(stage)]):
-                words = "'{origin}' must come first: '{stage}' starts from it"
-                raise PydanticCustomError("origin", words, {"origin": origin, "stage": stage})
         if values != [stage for stage in STAGES if stage in values]:
             order = {"order": ", ".join(STAGES)}
             raise PydanticCustomError("order", "out of order; the order is {order}", order)
     return values
+
+
+def _shipped(value: object) -> object:
+    if value not in SHIPPED:
+        names = {"names": ", ".join(SHIPPED)}
+        raise PydanticCustomError("policy", "no policy that ships; they are {names}", names)
+    return value
 
 
 def _kind(one: str, other: str, kind: type) -> Discriminator:
@@ -174,8 +177,9 @@ class Trainings(TaskOptions):
         alias_generator=AliasGenerator(validation_alias=lambda name: _KEYS.get(name, name))
     )
     # A narrower type is sound, as the values are frozen.
-    recipe: Literal["paper", "laptop"] = "paper"  # pyright: ignore[reportIncompatibleVariableOverride]
-    """Numbers and grounds that the other keys override: as published, or for a laptop."""
+    recipe: Literal["paper", "laptop", "tune"] = "paper"  # pyright: ignore[reportIncompatibleVariableOverride]
+    """Numbers and grounds that the other keys override: as published, for a laptop, or for stages
+    that `start` from a policy."""
 
 
 class StudyFile(Model):
@@ -188,11 +192,14 @@ class StudyFile(Model):
     stages: Annotated[list[StageName], Field(min_length=1), BeforeValidator(_stages)] = Field(
         default_factory=lambda: [stage.name for stage in PUBLISHED]
     )
-    """Stages that are trained, each after the one that it starts from: base, for all others."""
+    """Stages that are trained, each after the one that it starts from: base, for all others that
+    have no `start`."""
     trainings: Trainings
     """Options that all trainings share."""
     iterations: dict[StageName, Iterations] = Field(default_factory=dict)
     """Iterations of each stage; the recipe's by default."""
+    start: dict[StageName, Annotated[str, BeforeValidator(_shipped)]] = Field(default_factory=dict)
+    """Policies that ship and that stages start from, such as family, in place of a stage before."""
     evaluate: Evaluation = Evaluation()
     """Settings of the evaluation."""
     toy: Toy = Toy()
@@ -241,13 +248,16 @@ class Study:
         self._iterations: dict[str, int] = {
             str(stage): count for stage, count in file.iterations.items()
         }
+        self._start: dict[str, str] = {str(stage): name for stage, name in file.start.items()}
         self.name, self.text, self.toy = name, text, toy
         self.designs, self.stages = tuple(file.designs), tuple(file.stages)
         self.trainings, self.evaluate = file.trainings, file.evaluate
         self.recipe = RECIPES[file.trainings.recipe]
         self.changed: dict[str, Any] = {}
         seeds = file.seeds
-        self._check_iterations()
+        self._check_stages("iterations", self._iterations)
+        self._check_stages("start", self._start)
+        self._check_origins()
         self._set(file.trainings.values or {}, ("set",))
         if toy:
             small = file.toy
@@ -258,7 +268,10 @@ class Study:
             self.evaluate = file.evaluate.model_copy(update=given)
         # The toy's numbers are checked even if it is not asked for.
         kept = dict(self.changed)
-        self._set(file.toy.set, ("toy", "set"))
+        small_numbers = dict(file.toy.set)
+        if self._start:  # Policies that ship have layers of their own.
+            small_numbers.pop("learning.hidden", None)
+        self._set(small_numbers, ("toy", "set"))
         self.changed = self.changed if toy else kept
         self.config = self.recipe.config.with_values(self.changed)
         self.environments = self.trainings.envs or self.config.learning.environments
@@ -267,6 +280,10 @@ class Study:
     def iterations(self, stage: str) -> int:
         """Return the iterations of a stage."""
         return self._iterations.get(stage) or self.config.iterations(stage)
+
+    def start(self, stage: str) -> str | None:
+        """Return the name of the policy that ships and that a stage starts from; None for none."""
+        return self._start.get(stage)
 
     def place(self, *path: str | int) -> Location:
         """Return line and column of a value, by the keys and indices that lead to it."""
@@ -280,12 +297,26 @@ class Study:
             )
             self.changed[name] = value
 
-    def _check_iterations(self) -> None:
-        for stage in self._iterations:
+    def _check_stages(self, key: str, given: Mapping[str, object]) -> None:
+        """Refuse a stage that is not trained as the key of a mapping."""
+        for stage in given:
             if stage not in self.stages:
-                where = self._source.at(("iterations", stage), key=True)
+                where = self._source.at((key, stage), key=True)
                 remedy = f"stages: {', '.join(self.stages)}"
                 raise SpecError(Problem(f"stage '{stage}' is not trained here", where, remedy))
+
+    def _check_origins(self) -> None:
+        """Refuse a stage that starts from nothing that it could go on from."""
+        for i, stage in enumerate(self.stages):
+            origin = STAGES[stage].origin
+            if self.start(stage) is None and origin not in (None, *self.stages[:i]):
+                cause = f"'{origin}' must come first: '{stage}' starts from it"
+                remedy = f"add '{origin}', or a policy that ships: start: {{{stage}: family}}"
+                raise SpecError(Problem(cause, self._source.at(("stages",)), remedy))
+            if self.recipe is TUNE and self.start(stage) is None and origin is None:
+                cause = f"recipe {TUNE.name} starts from a policy that can run: '{stage}' does not"
+                where = self._source.at(("recipe",))
+                raise SpecError(Problem(cause, where, f"start: {{{stage}: family}}"))
 
 
 def at_place(make: Callable[[], _T], where: Location) -> _T:

@@ -10,13 +10,15 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from draft.extras import own_version
 from draft.learn.measuring.evaluation_options import Extras, Options, RollOuts
 from draft.learn.measuring.summary import ARMS, FORMAT, PROTOCOLS
 from draft.learn.task.stages import STAGES
 from draft.learn.training import run as runs
-from draft.study.file import Study
+from draft.learn.training.session import with_exported
+from draft.study.file import Study, at_place
 from draft.study.jobs import (
     REPORT,
     Evaluating,
@@ -53,9 +55,14 @@ def _training(
 ) -> Training:
     numbers = study.trainings, study.recipe, study.config
     plan = runs.Plan.of(group.members, *numbers, stage, seed, group.see_design)
-    if origin is not None and origin.plan.see_ground:
+    start = study.start(stage)
+    if start is not None:
+        where, origin = study.place("start", stage), None
+        plan = at_place(partial(with_exported, plan, start, runs.SHIPPED[start]), where)
+    elif origin is not None:
         # A policy that saw the ground keeps seeing it; one that did not may start to.
-        plan = replace(plan, see_ground=True)
+        sees = plan.see_ground or origin.plan.see_ground
+        plan = replace(plan, see_ground=sees, see_design=origin.plan.see_design)
     iterations = study.iterations(stage)
     determinants = plan.record() | {"from": origin.key if origin else None, "code": _code()}
     return Training(

@@ -166,8 +166,10 @@ class Training(Job):
     def differing(self, path: Path) -> list[str]:
         """Return what differs between the run in a folder and this job's plan."""
         old = runs.read_record(path)
-        # The run it started from was recorded when it began.
-        return runs.differences(old, self._wanted | {"origin": old.get("origin")})
+        wanted = self._wanted
+        if self.plan.origin is None:  # The run it started from was recorded when it began.
+            wanted = wanted | {"origin": old.get("origin")}
+        return runs.differences(old, wanted)
 
     @cached_property
     def _wanted(self) -> dict[str, object]:
@@ -176,6 +178,8 @@ class Training(Job):
     def prepare(self, folder: Path) -> None:
         """Create the run's folder from this job's plan, so that no design is read again."""
         base = folder / "runs" / self.needs[0] if self.needs else None
+        if self.plan.origin is not None:
+            base = self.plan.origin.run
         fresh = not runs.is_run(self.output(folder))
         origin = (base or SCRATCH) if fresh else None
         begin(self.output(folder), self.plan, self.group.designs, origin)

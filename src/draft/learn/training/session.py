@@ -92,7 +92,7 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
         remedy = 'use `origin="any"` or an ONNX file of such a run'
         raise DraftError(cause, remedy)
     if file is not None:
-        return _with_exported(plan, str(origin), file)
+        return with_exported(plan, str(origin), file)
     source = Path(origin) if origin else beside
     if origin is None and (source == folder or not is_run(source)):
         cause = f"stage {plan.stage} starts from a {before} policy, and there is no run {beside}"
@@ -124,8 +124,17 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
     )
 
 
-def _with_exported(plan: Plan, name: str, file: Path) -> Plan:
-    """The plan with the exported policy that it starts from."""
+def with_exported(plan: Plan, name: str, file: Path) -> Plan:
+    """Return a plan with the exported policy that it starts from.
+
+    Args:
+        plan: the plan.
+        name: the policy's name or file, as users write it.
+        file: its ONNX file.
+
+    Raises:
+        DraftError: it does not fit the robots or the networks of the plan.
+    """
     if plan.mixed:
         policy = open_legs_policy(file)
     else:
