@@ -66,7 +66,11 @@ TRAINED_SEED = 0
 GROUPS = {
     "quadrupeds": (("quadruped",), 0.99, 0.04),
     "hexapods": (("hexapod",), 0.99, 0.05),
-    "bipeds and humanoids": (("biped", "biped_of_four", HUMANOID), 0.95, 0.08),
+    "bipeds and humanoids": (
+        ("biped", "biped_of_four", "biped_slanting", HUMANOID),
+        0.95,
+        0.08,
+    ),
 }
 PUSHED = {"quadrupeds": 0.95, "bipeds and humanoids": 0.75}
 UNTRAINED_UP, HUMANOID_SPEED, MEGABYTES, MILLISECONDS = 0.8, 0.4, 2.0, 1.0

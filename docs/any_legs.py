@@ -53,7 +53,8 @@ not, as a reward for turning of 0.7 per second taught nothing in 2.4 million ste
 did in as many. Robots on two legs and those with five joints a leg, whose commands grew meanwhile,
 fall more often than by the policy before. Real robots that fall lie outside the numbers of the
 training, most by the torque or the speed of their ankles, or by a hip pitch whose axis slants by
-25 to 45 degrees (unitree_h2, limx_oli, adam_lite, agibot_x1): no body of the training has one."""
+25 to 45 degrees (unitree_h2, limx_oli, adam_lite, agibot_x1): no body of the training has one. The
+generator draws such bodies since (biped_slanting), for the next training."""
 INTRODUCTION = """\
 Draft ships one policy for robots of any legs: two, four or six of them, with three to six driven
 joints each. The shipped hexapod, biped and humanoid walk with it; of real robots, nine of ten

@@ -80,8 +80,9 @@ Most are below, by a tenth to a third, and steps by far. That is not the machine
 ran 3.8 m/s with the Go2 and 6.6 m/s with the B2 on the soft feet and without the delay of its first
 training, which does not hold on hard ground. To learn on for 150 iterations with one machine alone
 gains little (below); makers' controllers had more time and other rewards. The climbing policy has
-learnt from nine million steps and climbs a quarter of the leg length, where papers jump. A policy
-of a machine's own: `draft twin FILE --capabilities --train DIR`."""
+learnt from 25 million steps and climbs a quarter of the leg length, where papers jump; it stops
+before higher steps rather than falls, and was still learning. A policy of a machine's own:
+`draft twin FILE --capabilities --train DIR`."""
 COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
 OWNED = ("top_speed", "kick", "walking_power")
 LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.

@@ -165,8 +165,10 @@ def test_a_stage_may_start_from_a_policy_that_ships(tmp_path: Path) -> None:
         training(made, f"bear-{stage}-0") for stage in ("base", "terrain", "push")
     )
     assert (base.needs, terrain.needs, push.needs) == ((), (), (base.name,))
-    assert base.plan.origin and base.plan.origin.run == "family"
-    assert terrain.plan.origin and terrain.plan.origin.run == "family_climb"
+    assert base.plan.origin
+    assert base.plan.origin.run == "family"
+    assert terrain.plan.origin
+    assert terrain.plan.origin.run == "family_climb"
     assert push.plan.origin is None
     assert all(job.plan.see_design for job in (base, terrain, push))
     assert (base.plan.see_ground, terrain.plan.see_ground) == (False, True)

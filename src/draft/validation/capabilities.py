@@ -30,6 +30,7 @@ from draft.values import scalar
 
 SPEEDS = 8  # Commands up to the fastest that was trained.
 WALKING = 0.5  # Commanded speed of a walk, per sqrt(g L).
+CLIMBING = 0.3  # Commanded speed on stairs, per sqrt(g L).
 KICKS = (1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5)  # Per sqrt(g L).
 STEPS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)  # Per L.
 REPLICAS, SECONDS, SETTLE = 16, 9.0, 3.0
@@ -128,7 +129,7 @@ def measured(
     kicks = _test(PUSH, tuple(round(k * root, 3) for k in KICKS), walking=WALKING * root)
     chosen = [(source, (runs, kicks))]
     if climber is not None:
-        up, down = (_test(name, heights, walking=WALKING * root) for name in (ASCENT, DESCENT))
+        up, down = (_test(name, heights, walking=CLIMBING * root) for name in (ASCENT, DESCENT))
         chosen.append((climber, (up, down)))
     threads, settle = cores() if engine.name == NATIVE else 1, seconds * SETTLE / SECONDS
     parts = []

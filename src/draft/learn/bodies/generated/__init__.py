@@ -120,6 +120,10 @@ def _biped(random: _Random) -> dict[str, Array]:
     }
 
 
+def _biped_slanting(random: _Random) -> dict[str, Array]:
+    return _biped(random) | {"slant": random.between(0.0, 0.78)}
+
+
 def _biped_of_four(random: _Random) -> dict[str, Array]:
     size, drawn = _two_legs(random)
     return drawn | {"actuators.ankle.peak_torque": 55 * size**_POWER * random.spread(0.35, 1.5)}
@@ -178,9 +182,10 @@ def _humanoid(random: _Random) -> dict[str, Array]:
 KINDS: Mapping[str, Kind] = {
     "quadruped": Kind(FOLDER / "quadruped", 0.45, _quadruped),
     "hexapod": Kind(ROBOTS / "hexapod", 0.12, _hexapod),
-    "biped": Kind(FOLDER / "biped", 0.2, _biped),
+    "biped": Kind(FOLDER / "biped", 0.13, _biped),
     "biped_of_four": Kind(FOLDER / "biped_of_four", 0.08, _biped_of_four),
     "humanoid": Kind(ROBOTS / "humanoid", 0.15, _humanoid),
+    "biped_slanting": Kind(FOLDER / "biped_slanting", 0.07, _biped_slanting),
 }
 
 
