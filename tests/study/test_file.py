@@ -161,8 +161,9 @@ def test_a_family_is_read() -> None:
         (TEXT + "start: {terrain: family}\n", "small.yaml:7:9: stage 'terrain' is not trained"),
         (TEXT + "start: {bse: family}\n", "small.yaml:7:9: start.bse: unknown value 'bse'"),
         (TEXT + "start: {base: famly}\n",
-         "small.yaml:7:15: start.base: no policy that ships; they are any, family"),
-        (TEXT + "start: {base: 3}\n", "small.yaml:7:15: start.base: no policy that ships"),
+         "small.yaml:7:15: start.base: unknown value 'famly'\n  did you mean 'family'?"),
+        (TEXT + "start: {base: 3}\n", "small.yaml:7:15: start.base: expected text"),
+        (TEXT + "start: {base: [family]}\n", "small.yaml:7:15: start.base: expected text"),
         (TEXT + "recipe: tune\n",
          "small.yaml:7:9: recipe tune starts from a policy that can run: 'base' does not\n"
          "  start: {base: family}"),

@@ -191,7 +191,7 @@ def test_a_toy_keeps_the_layers_of_a_policy_that_it_starts_from() -> None:
 
 
 def test_a_policy_that_does_not_fit_is_refused_where_it_is_named() -> None:
-    with pytest.raises(DraftError, match=r"small.yaml:7:15: .*has layers of 256, 128, 64 units"):
+    with pytest.raises(DraftError, match=r"7:15: .*has layers of 256, 128, 64 units.*\n.*: tune"):
         jobs(TEXT + "start: {base: family}\n")
 
 

@@ -24,7 +24,7 @@ from draft.laws.residuals import ErrorSource
 from draft.learn.measuring.evaluation_options import RollOuts
 from draft.learn.task.config import Config
 from draft.learn.task.recipes import RECIPES, TUNE
-from draft.learn.task.stages import PUBLISHED, STAGES, StageName
+from draft.learn.task.stages import PUBLISHED, STAGES, StageName, one_of
 from draft.learn.training.options import TaskOptions, TrainOptions
 from draft.learn.training.run import SHIPPED
 from draft.settings import expected
@@ -79,13 +79,6 @@ def _stages(values: object) -> object:
             order = {"order": ", ".join(STAGES)}
             raise PydanticCustomError("order", "out of order; the order is {order}", order)
     return values
-
-
-def _shipped(value: object) -> object:
-    if value not in SHIPPED:
-        names = {"names": ", ".join(SHIPPED)}
-        raise PydanticCustomError("policy", "no policy that ships; they are {names}", names)
-    return value
 
 
 def _kind(one: str, other: str, kind: type) -> Discriminator:
@@ -198,7 +191,7 @@ class StudyFile(Model):
     """Options that all trainings share."""
     iterations: dict[StageName, Iterations] = Field(default_factory=dict)
     """Iterations of each stage; the recipe's by default."""
-    start: dict[StageName, Annotated[str, BeforeValidator(_shipped)]] = Field(default_factory=dict)
+    start: dict[StageName, Annotated[str, one_of(SHIPPED)]] = Field(default_factory=dict)
     """Policies that ship and that stages start from, such as family, in place of a stage before."""
     evaluate: Evaluation = Evaluation()
     """Settings of the evaluation."""
@@ -255,8 +248,8 @@ class Study:
         self.recipe = RECIPES[file.trainings.recipe]
         self.changed: dict[str, Any] = {}
         seeds = file.seeds
-        self._check_stages("iterations", self._iterations)
-        self._check_stages("start", self._start)
+        for key, given in (("iterations", self._iterations), ("start", self._start)):
+            self._check_stages(key, given)
         self._check_origins()
         self._set(file.trainings.values or {}, ("set",))
         if toy:
@@ -268,9 +261,10 @@ class Study:
             self.evaluate = file.evaluate.model_copy(update=given)
         # The toy's numbers are checked even if it is not asked for.
         kept = dict(self.changed)
+        # Policies that ship have layers of their own.
         small_numbers = dict(file.toy.set)
-        if self._start:  # Policies that ship have layers of their own.
-            small_numbers.pop("learning.hidden", None)
+        if self._start and "set" not in file.toy.model_fields_set:
+            del small_numbers["learning.hidden"]  # Policies that ship have layers of their own.
         self._set(small_numbers, ("toy", "set"))
         self.changed = self.changed if toy else kept
         self.config = self.recipe.config.with_values(self.changed)
@@ -282,7 +276,7 @@ class Study:
         return self._iterations.get(stage) or self.config.iterations(stage)
 
     def start(self, stage: str) -> str | None:
-        """Return the name of the policy that ships and that a stage starts from; None for none."""
+        """Return the name of the policy that a stage starts from; None for a stage or none."""
         return self._start.get(stage)
 
     def place(self, *path: str | int) -> Location:
@@ -315,12 +309,12 @@ class Study:
                 raise SpecError(Problem(cause, self._source.at(("stages",)), remedy))
             if self.recipe is TUNE and self.start(stage) is None and origin is None:
                 cause = f"recipe {TUNE.name} starts from a policy that can run: '{stage}' does not"
-                where = self._source.at(("recipe",))
-                raise SpecError(Problem(cause, where, f"start: {{{stage}: family}}"))
+                remedy = f"start: {{{stage}: family}}"
+                raise SpecError(Problem(cause, self._source.at(("recipe",)), remedy))
 
 
-def at_place(make: Callable[[], _T], where: Location) -> _T:
-    """Call a function, and give its errors a place in a file.
+def at_place(make: Callable[[], _T], where: Location, remedy: str = "") -> _T:
+    """Call a function, and give its errors a place in a file and, if one is given, a remedy.
 
     Raises:
         DraftError: the error that was raised, with the place.
@@ -328,7 +322,7 @@ def at_place(make: Callable[[], _T], where: Location) -> _T:
     try:
         return make()
     except DraftError as error:
-        problems = [Problem(_cause(p), where, p.remedy) for p in error.problems]
+        problems = [Problem(_cause(p), where, remedy or p.remedy) for p in error.problems]
         raise type(error)(problems) from None
 
 

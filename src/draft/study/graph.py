@@ -58,7 +58,8 @@ def _training(
     start = study.start(stage)
     if start is not None:
         where, origin = study.place("start", stage), None
-        plan = at_place(partial(with_exported, plan, start, runs.SHIPPED[start]), where)
+        make = partial(with_exported, plan, start, runs.SHIPPED[start])
+        plan = at_place(make, where, "name one that fits; `recipe: tune` has their layers")
     elif origin is not None:
         # A policy that saw the ground keeps seeing it; one that did not may start to.
         sees = plan.see_ground or origin.plan.see_ground

@@ -7,7 +7,7 @@ group of its name. This module loads neither mjlab nor PyTorch; the functions do
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -59,14 +59,19 @@ class Stage:
 STAGES: Registry[Stage] = Registry("stage")
 
 
-def _known(value: object) -> object:
-    if isinstance(value, str) and value not in STAGES:
-        raise PydanticKnownError("literal_error", {"expected": ", ".join(map(repr, STAGES))})
-    return value
+def one_of(names: Collection[str]) -> BeforeValidator:
+    """Return a validator of text that is one of some names, which may grow."""
+
+    def check(value: object) -> object:
+        if isinstance(value, str) and value not in names:
+            raise PydanticKnownError("literal_error", {"expected": ", ".join(map(repr, names))})
+        return value
+
+    return BeforeValidator(check)
 
 
 # Name of a stage in options and files; extensions may add stages.
-StageName = Annotated[str, BeforeValidator(_known)]
+StageName = Annotated[str, one_of(STAGES)]
 
 
 def is_like(stage: str, other: str) -> bool:
