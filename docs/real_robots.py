@@ -66,7 +66,8 @@ numbers leave out.
 ![The bodies that Draft predicts of them, at one scale](images/real_robots/robots.png)
 
 Physics: contacts with a time constant of 10 ms, targets that arrive up to 15 ms late, 16 roll-outs
-of 9 s at each command, kick and step, and no command that is faster than those of the training.
+of 9 s at each command, kick and step, no command that is faster than those of the training, and
+stairs at 0.3 sqrt(g L) with the leg length L.
 Intervals are those of the roll-outs alone, from 5 to 95 %."""
 RULE = """\
 The rule, stated before the comparison: top speed, step and standing load are limits of a machine.
