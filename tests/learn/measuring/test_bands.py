@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from draft.learn.measuring.bands import mass_band, mass_bands
+from draft.learn.measuring.bands import FILE, mass_band, mass_bands
 
 ROBOTS = Path(__file__).parents[3] / "examples/results/real_robots"
 
 
-@pytest.mark.parametrize("name", ["top_speed", "kick", "cost_of_transport"])
+@pytest.mark.parametrize("name", ["top_speed", "kick", "step_up", "cost_of_transport"])
 def test_a_band_holds_the_share_of_the_robots_that_it_claims(name: str) -> None:
     ratios = []
     for path in ROBOTS.glob("*.json"):
@@ -31,7 +31,8 @@ def test_a_band_holds_the_share_of_the_robots_that_it_claims(name: str) -> None:
 def test_the_sentence_names_capabilities_and_robots() -> None:
     words = mass_bands(["eta", "top_speed", "step"])
     assert words.startswith("masses are predictions, for nine of ten real robots good to: ")
-    assert "top speed within 1." in words
-    assert "step within 1." in words
+    folds = json.loads(FILE.read_text(encoding="utf-8"))
+    for label, name in (("top speed", "top_speed"), ("step", "step_up")):
+        assert f"{label} within {folds[name]['fold_90']:.2f}" in words
     assert "η" not in words
     assert mass_bands(["eta"]) == ""
