@@ -66,7 +66,7 @@ def test_a_run_keeps_robots_of_several_topologies(run: Run) -> None:
     opened = open_run(run.folder).plan
     assert opened == run.plan
     assert opened.mixed
-    assert len(by_topology(opened.members)) == 5
+    assert len(by_topology(opened.members)) == 6
     row = (run.folder / "progress.csv").read_text(encoding="utf-8").splitlines()[0]
     for members in by_topology(opened.members):
         assert f"{kind_of(members)}/tracking_error" in row
