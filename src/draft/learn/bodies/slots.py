@@ -35,10 +35,11 @@ SLOTS = len(LEGS) * len(ROLES)
 # Numbers of each joint, of each leg, and of the body; see `slot_features`.
 OF_JOINT = ("presence", "peak torque", "no-load speed", "inertia", "bend")
 OF_LEG = ("hip ahead", "hip aside", "foot ahead", "foot aside", "thigh")
-OF_BODY = ("leg length", "mass", "height", "legs", "sole")
+OF_BODY = ("leg length", "mass", "height", "legs", "sole", "centre ahead", "centre above")
 FEATURES = len(OF_JOINT) * SLOTS + len(OF_LEG) * len(LEGS) + len(OF_BODY)
 # Units of them, by `readable_slots`.
-_UNITS_OF_JOINT, _UNITS_OF_BODY = ("", "N m", "rad/s", "kg m2", "rad"), ("m", "kg", "m", "", "m")
+_UNITS_OF_JOINT = ("", "N m", "rad/s", "kg m2", "rad")
+_UNITS_OF_BODY = ("m", "kg", "m", "", "m", "m", "m")
 _UPRIGHT = 0.7  # Vertical part of an axis from which a joint turns the leg about the vertical.
 _ALONE = "train a policy for this robot alone: 'draft train'"
 _STRAIGHT = 0.02  # Angle of a knee below which a leg counts as straight [rad].
@@ -135,9 +136,10 @@ def readable_slots(features: Array, member: LeggedRobot) -> Array:
     joints[..., 4, :] = np.arcsin(np.clip(joints[..., 4, :], -1.0, 1.0))
     rest = features[..., joints.shape[-2] * SLOTS :] * length
     body = features[..., -len(OF_BODY) :]
-    rest[..., -5] = np.exp(body[..., 0]) * REFERENCE_LEG
-    rest[..., -4] = np.exp(body[..., 1]) * MASS * member.scale**3
-    rest[..., -2] = body[..., 3] * 4
+    first = rest.shape[-1] - len(OF_BODY)
+    rest[..., first] = np.exp(body[..., 0]) * REFERENCE_LEG
+    rest[..., first + 1] = np.exp(body[..., 1]) * MASS * member.scale**3
+    rest[..., first + 3] = body[..., 3] * 4
     return np.concatenate([joints.reshape(*shape, -1), rest], axis=-1)
 
 
@@ -181,6 +183,7 @@ class _Pose:
         self.axes, self.anchors = data.xaxis[ids].copy(), data.xanchor[ids].copy()
         self.feet = np.array([data.site_xpos[own.site(name).id] for name in member.feet])
         self.inertia = own.dof_M0[[own.joint(name).dofadr[0] for name in member.joints]]
+        self.centre = own.body_mass @ data.xipos / own.body_mass.sum()
         self.left = self.feet[:, 1] > 0
 
     def knee(self, leg: int) -> tuple[int, float]:
@@ -264,6 +267,8 @@ class _Pose:
             member.height / length,
             len(member.feet) / 4,
             self._sole() / length,
+            (self.centre[0] - middle[0]) / length,
+            (self.centre[2] - middle[2]) / length,
         )
         return np.concatenate([per_joint.ravel(), per_leg.ravel(), body])
 
@@ -281,7 +286,8 @@ def slot_features(members: Sequence[LeggedRobot]) -> list[tuple[float, ...]]:
     sine of its angle in the home pose. Of each leg, per L: place of hip and foot ahead of the
     middle of the feet and aside, and the distance from knee to foot. Of the body: logarithms of
     L per 0.48 m and of mass per 30 kg and cubed scale; height per L, a quarter of the number of
-    legs, and half the length of a sole per L. Numbers of slots without a joint are zero.
+    legs, half the length of a sole per L, and the centre of mass ahead of the middle of the feet
+    and above it, per L. Numbers of slots without a joint are zero.
 
     Raises:
         DraftError: as `slots_of`.

@@ -25,6 +25,7 @@ BODIES = 2000  # Usual number of bodies.
 FOLDER = Path(__file__).parent
 STRENGTH = 0.6  # Half width of the logarithm of the factor on the torque.
 _POWER = 3.3  # Power of the leg length that the torque rises with.
+_LEAN = 0.08  # Largest angle of a humanoid's legs from where its sole is under its waist [rad].
 _MARGIN = 1.6  # Least ratio of peak torque to standing torque.
 Draw = Callable[["_Random"], dict[str, Array]]
 
@@ -149,7 +150,7 @@ def _two_legs(random: _Random) -> tuple[Array, dict[str, Array]]:
 
 
 def _humanoid(random: _Random) -> dict[str, Array]:
-    size = random.spread(0.7, 1.5)
+    size, longer = random.spread(0.6, 1.4), random.between(0.9, 2.0)
     torque = size**_POWER
     lengths = {
         "torso_length": 0.5,
@@ -168,24 +169,33 @@ def _humanoid(random: _Random) -> dict[str, Array]:
     drawn = {name: value * size * random.between(0.8, 1.2) for name, value in lengths.items()}
     # Less of the thigh above its yaw motor: more of its mass lies where that of others does.
     drawn["lower_hip_length"] = 0.15 * size * random.between(0.7, 1.1)
+    # Long legs under a short torso, so that the centre of mass lies lower than in the shipped one.
+    for name in ("thigh_length", "shank_length"):
+        drawn[name] *= longer
+    drawn["torso_length"] *= random.between(0.6, 1.0)
+    drawn["foot_offset"] = drawn["foot_length"] * random.between(0.0, 0.25)
+    # The hips are not above the middle of the feet in all: others carry more in front or behind.
+    bend, leg = random.between(0.15, 1.0), drawn["lower_hip_length"] + drawn["thigh_length"]
+    under = (drawn["shank_length"] * bend - drawn["foot_offset"]) / (leg + drawn["shank_length"])
+    drawn |= {"knee_bend": bend, "hip_bend": under + random.between(-_LEAN, _LEAN)}
     speeds = {"large": 5.9, "medium": 10.3, "small": 11.5}
-    torques = {"large": 120.0, "medium": 72.0, "small": 24.0}
-    least = {"large": 0.6, "medium": 0.35, "small": 0.5}
+    torques = {"large": 120.0 * longer, "medium": 72.0, "small": 24.0}
+    least = {"large": 0.6, "medium": 0.25, "small": 0.3}
     for name, peak in torques.items():
         drawn[f"actuators.{name}.peak_torque"] = peak * torque * random.spread(least[name], 1.6)
         speed = speeds[name] / np.sqrt(size) * random.spread(0.7, 3.0)
         drawn[f"actuators.{name}.no_load_speed"] = speed
         drawn[f"actuators.{name}.gear_ratio"] = 292.1 / speed
-    return drawn | {"knee_bend": random.between(0.15, 1.0)}
+    return drawn
 
 
 KINDS: Mapping[str, Kind] = {
-    "quadruped": Kind(FOLDER / "quadruped", 0.45, _quadruped),
-    "hexapod": Kind(ROBOTS / "hexapod", 0.12, _hexapod),
+    "quadruped": Kind(FOLDER / "quadruped", 0.38, _quadruped),
+    "hexapod": Kind(ROBOTS / "hexapod", 0.10, _hexapod),
     "biped": Kind(FOLDER / "biped", 0.13, _biped),
     "biped_of_four": Kind(FOLDER / "biped_of_four", 0.08, _biped_of_four),
-    "humanoid": Kind(ROBOTS / "humanoid", 0.15, _humanoid),
-    "biped_slanting": Kind(FOLDER / "biped_slanting", 0.07, _biped_slanting),
+    "humanoid": Kind(ROBOTS / "humanoid", 0.20, _humanoid),
+    "biped_slanting": Kind(FOLDER / "biped_slanting", 0.11, _biped_slanting),
 }
 
 
