@@ -1,6 +1,6 @@
 """How well does the policy of all legs walk bodies that it was not trained with?
 
-    python -m benchmarks.any_legs                 # the policy that ships, 40 bodies
+    python -m benchmarks.any_legs                 # the policy that ships, 80 bodies
     python -m benchmarks.any_legs --policy FILE   # an export of 'draft train any'
     python -m benchmarks.any_legs --out examples/results/any_legs.json
 
@@ -100,9 +100,9 @@ class Job:
 
 def main(
     policy: Path = ANY,
-    bodies: int = 40,
+    bodies: int = 80,
     seed: int = 7,
-    replicas: int = 4,
+    replicas: int = 2,
     seconds: float = SECONDS,
     out: Path | None = None,
 ) -> None:

@@ -35,11 +35,11 @@ SLOTS = len(LEGS) * len(ROLES)
 # Numbers of each joint, of each leg, and of the body; see `slot_features`.
 OF_JOINT = ("presence", "peak torque", "no-load speed", "inertia", "bend")
 OF_LEG = ("hip ahead", "hip aside", "foot ahead", "foot aside", "thigh")
-OF_BODY = ("leg length", "mass", "height", "legs", "sole", "centre ahead", "centre above")
+OF_BODY = ("leg length", "mass", "legs", "sole", "centre ahead", "centre above")
 FEATURES = len(OF_JOINT) * SLOTS + len(OF_LEG) * len(LEGS) + len(OF_BODY)
 # Units of them, by `readable_slots`.
 _UNITS_OF_JOINT = ("", "N m", "rad/s", "kg m2", "rad")
-_UNITS_OF_BODY = ("m", "kg", "m", "", "m", "m", "m")
+_UNITS_OF_BODY = ("m", "kg", "", "m", "m", "m")
 _UPRIGHT = 0.7  # Vertical part of an axis from which a joint turns the leg about the vertical.
 _ALONE = "train a policy for this robot alone: 'draft train'"
 _STRAIGHT = 0.02  # Angle of a knee below which a leg counts as straight [rad].
@@ -139,7 +139,7 @@ def readable_slots(features: Array, member: LeggedRobot) -> Array:
     first = rest.shape[-1] - len(OF_BODY)
     rest[..., first] = np.exp(body[..., 0]) * REFERENCE_LEG
     rest[..., first + 1] = np.exp(body[..., 1]) * MASS * member.scale**3
-    rest[..., first + 3] = body[..., 3] * 4
+    rest[..., first + 2] = body[..., 2] * 4
     return np.concatenate([joints.reshape(*shape, -1), rest], axis=-1)
 
 
@@ -264,7 +264,6 @@ class _Pose:
         body = (
             math.log(member.scale),
             math.log(mass / member.scale**3 / MASS),
-            member.height / length,
             len(member.feet) / 4,
             self._sole() / length,
             (self.centre[0] - middle[0]) / length,
@@ -285,7 +284,7 @@ def slot_features(members: Sequence[LeggedRobot]) -> list[tuple[float, ...]]:
     m g L, of no-load speed times sqrt(L / g), and of the inertia about the joint per m L^2, and the
     sine of its angle in the home pose. Of each leg, per L: place of hip and foot ahead of the
     middle of the feet and aside, and the distance from knee to foot. Of the body: logarithms of
-    L per 0.48 m and of mass per 30 kg and cubed scale; height per L, a quarter of the number of
+    L per 0.48 m and of mass per 30 kg and cubed scale; a quarter of the number of
     legs, half the length of a sole per L, and the centre of mass ahead of the middle of the feet
     and above it, per L. Numbers of slots without a joint are zero.
 

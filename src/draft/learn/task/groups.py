@@ -389,6 +389,12 @@ class Climbing:
     progress: float = choice(
         0.0, "1", "weight of the speed along the command, per command", DRAFT, within=ANY
     )
+    clearance: float = choice(
+        0.0, "m", "target height of the feet; 0 for that of all stages", DRAFT, 1.0
+    )
+    clearance_share: float = choice(
+        1.0, "1", "weight of the penalty of other heights, per that of all stages", DRAFT
+    )
     episode: float = choice(0.0, "s", "length of an episode; 0 for that of all stages", DRAFT, 0.5)
     start_rows: int = choice(
         1, "1", "number of the easiest rows, where robots start", CODE, within=POSITIVE

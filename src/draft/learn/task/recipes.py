@@ -141,6 +141,9 @@ TUNE = Recipe(
         "learning.least_rate": Change(1e-4, "as small as the policy's change requires"),
         "learning.entropy": Change(0.003, "it need not explore other gaits"),
         "rewards.power_weight": Change(-0.1, "without it gaits draw a fifth more power again"),
+        "terrain.clearance": Change(0.18, "feet that rise as on a plane meet higher steps"),
+        "terrain.clearance_share": Change(0.5, "to climb counts more than how the feet move"),
+        "terrain.progress": Change(2.5, "with 1 robots stand still before a step"),
     },
     LAPTOP.plane,
 )

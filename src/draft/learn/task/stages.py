@@ -184,6 +184,9 @@ def terrain(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
         cfg.rewards["progress"] = RewardTermCfg(
             func=rewards.progress, weight=t.progress, params={"gate": gate}
         )
+    if t.clearance:
+        cfg.rewards["clearance"].params["target"] = scaled(t, "clearance")
+    cfg.rewards["clearance"].weight *= t.clearance_share
     if task.ground == "uneven":
         # A robot that runs away from hard ground has not mastered it.
         cfg.terminations["left_ground"].time_out = False

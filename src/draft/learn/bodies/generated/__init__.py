@@ -23,7 +23,7 @@ from draft.values import Array
 
 BODIES = 2000  # Usual number of bodies.
 FOLDER = Path(__file__).parent
-STRENGTH = 0.6  # Half width of the logarithm of the factor on the torque.
+STRENGTH = 0.8  # Half width of the logarithm of the factor on the torque.
 _POWER = 3.3  # Power of the leg length that the torque rises with.
 _LEAN = 0.08  # Largest angle of a humanoid's legs from where its sole is under its waist [rad].
 _MARGIN = 1.6  # Least ratio of peak torque to standing torque.
@@ -84,7 +84,7 @@ def _quadruped(random: _Random) -> dict[str, Array]:
         "front_bend": front,
         "rear_bend": rear,
         "torque": 72 * size**_POWER * random.strength(),
-        "speed": 40 / np.sqrt(size) * random.spread(0.3, 1.3),
+        "speed": 40 / np.sqrt(size) * random.spread(0.2, 1.5),
         "reduction": random.between(0.8, 2.0),
     }
 
@@ -117,7 +117,7 @@ def _biped(random: _Random) -> dict[str, Array]:
         "actuators.yaw.no_load_speed": 14 / np.sqrt(size) * random.spread(0.6, 2.0),
         "actuators.ankle.peak_torque": ankle,
         "actuators.roll.peak_torque": ankle * random.spread(0.3, 1.0),
-        "actuators.roll.no_load_speed": 14 / np.sqrt(size) * random.spread(0.6, 2.5),
+        "actuators.roll.no_load_speed": 14 / np.sqrt(size) * random.spread(0.4, 3.0),
     }
 
 
@@ -138,14 +138,14 @@ def _two_legs(random: _Random) -> tuple[Array, dict[str, Array]]:
     return size, {
         "thigh_length": thigh,
         "shank_length": shank,
-        "pelvis_height": 0.16 * size * random.between(0.8, 3.0),
+        "pelvis_height": 0.16 * size * random.between(0.5, 3.0),
         "pelvis_depth": 0.2 * size * random.between(0.7, 1.2),
         "foot_length": np.clip(0.2 * size * random.between(0.7, 1.3), 0.06, 0.4),
         "foot_width": np.clip(0.09 * size * random.between(0.7, 1.3), 0.03, 0.2),
         "knee_bend": random.between(0.2, 1.2),
         "actuators.hip.peak_torque": 110 * size**_POWER * random.strength(),
-        "actuators.hip.no_load_speed": 14 / np.sqrt(size) * random.spread(0.6, 1.8),
-        "actuators.ankle.no_load_speed": 14 / np.sqrt(size) * random.spread(0.5, 2.5),
+        "actuators.hip.no_load_speed": 14 / np.sqrt(size) * random.spread(0.5, 2.5),
+        "actuators.ankle.no_load_speed": 14 / np.sqrt(size) * random.spread(0.4, 3.0),
     }
 
 
@@ -180,10 +180,10 @@ def _humanoid(random: _Random) -> dict[str, Array]:
     drawn |= {"knee_bend": bend, "hip_bend": under + random.between(-_LEAN, _LEAN)}
     speeds = {"large": 5.9, "medium": 10.3, "small": 11.5}
     torques = {"large": 120.0 * longer, "medium": 72.0, "small": 24.0}
-    least = {"large": 0.6, "medium": 0.25, "small": 0.3}
+    least = {"large": 0.4, "medium": 0.25, "small": 0.3}
     for name, peak in torques.items():
         drawn[f"actuators.{name}.peak_torque"] = peak * torque * random.spread(least[name], 1.6)
-        speed = speeds[name] / np.sqrt(size) * random.spread(0.7, 3.0)
+        speed = speeds[name] / np.sqrt(size) * random.spread(0.6, 4.0)
         drawn[f"actuators.{name}.no_load_speed"] = speed
         drawn[f"actuators.{name}.gear_ratio"] = 292.1 / speed
     return drawn
