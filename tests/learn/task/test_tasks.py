@@ -9,9 +9,12 @@ import pytest
 
 pytest.importorskip("mjlab")
 
+import draft
+from draft.learn.bodies.legged import legged_robot
 from draft.learn.task.config import STAGES, Config
 from draft.learn.task.constants import Scaled
 from draft.learn.task.mdp.environment import environment
+from draft.learn.task.recipes import RECIPES
 from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.agent import agent
 
@@ -58,6 +61,25 @@ def test_the_push_stage_changes_one_reward(members: Any) -> None:
     base, found = (made(members, s).rewards for s in ("base", "push"))
     assert [name for name in found if found[name] != base[name]] == ["linear_velocity"]
     assert found["linear_velocity"].params == {"sigma": Scaled(0.5)}
+
+
+def test_feet_may_rise_higher_on_stairs_than_in_the_other_stages(members: Any) -> None:
+    config = Config().with_values({"terrain.clearance": 0.2, "terrain.clearance_share": 0.25})
+    usual, terrain = (
+        made(members, s, config=config).rewards["clearance"] for s in ("base", "terrain")
+    )
+    assert usual.params["target"] == Scaled(0.1, 1.0)
+    assert (terrain.weight, terrain.params["target"]) == (-0.5, Scaled(0.2, 1.0))
+
+
+@pytest.mark.parametrize(("name", "first", "most"), [("hexapod", 1.0, 6.5), ("humanoid", 0.5, 1.3)])
+def test_robots_on_two_legs_begin_and_end_with_slower_commands(
+    name: str, first: float, most: float
+) -> None:
+    robot = legged_robot(draft.load(name).resolve())
+    command: Any = made((robot,), "any", config=RECIPES["any"].config).commands["twist"]
+    assert command.growth.start == Scaled(first, 0.5)
+    assert command.forward.value == pytest.approx(most)
 
 
 @pytest.mark.parametrize("stage", STAGES)
