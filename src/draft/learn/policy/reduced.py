@@ -39,7 +39,8 @@ from draft.values import Array
 
 _REMEDY = "use the one that ships, or one of 'draft train any'"
 _NARROW = 0.1  # Width of a range of features below which it counts as this wide.
-LAYOUT = "slots, knees by their bend, centre of mass"  # Value of the metadata's key `layout` of such a policy.
+# Value of the metadata's key `layout` of such a policy.
+LAYOUT = "slots, knees by their bend, centre of mass"
 # Largest divisor of an observation that is constant in the training, with the epsilon of rsl-rl.
 _CONSTANT = 1.01e-2
 
