@@ -168,7 +168,7 @@ ANY = Recipe(
         "push.ramp": Change(
             ((0, 1.0), (600, 2.5)), "quadrupeds that are kicked hard splay their legs, and shuffle"
         ),
-        "episodes.centre": Change(0.04, "computers, batteries and heads weigh what no spec says"),
+        "episodes.centre": Change(0.03, "computers, batteries and heads weigh what no spec says"),
         "observations.linear_velocity_noise": Change(0.1, "odometry of legs errs by as much"),
         "rewards.linear_sigma": Change(0.4, "slow commands are followed, not ignored"),
         "rewards.angular_sigma": Change(1.0, "roll and pitch rates of a gait hide the turn"),

@@ -25,7 +25,7 @@ BODIES = 2000  # Usual number of bodies.
 FOLDER = Path(__file__).parent
 STRENGTH = 0.8  # Half width of the logarithm of the factor on the torque.
 _POWER = 3.3  # Power of the leg length that the torque rises with.
-_LEAN = 0.08  # Largest angle of a humanoid's legs from where its sole is under its waist [rad].
+_LEAN = 0.06  # Largest angle of a humanoid's legs from where its sole is under its waist [rad].
 _MARGIN = 1.6  # Least ratio of peak torque to standing torque.
 Draw = Callable[["_Random"], dict[str, Array]]
 
@@ -172,6 +172,8 @@ def _humanoid(random: _Random) -> dict[str, Array]:
     # Long legs under a short torso, so that the centre of mass lies lower than in the shipped one.
     for name in ("thigh_length", "shank_length"):
         drawn[name] *= longer
+    for name in ("foot_length", "foot_width"):
+        drawn[name] *= np.sqrt(longer)
     drawn["torso_length"] *= random.between(0.6, 1.0)
     drawn["foot_offset"] = drawn["foot_length"] * random.between(0.0, 0.25)
     # The hips are not above the middle of the feet in all: others carry more in front or behind.
@@ -179,8 +181,8 @@ def _humanoid(random: _Random) -> dict[str, Array]:
     under = (drawn["shank_length"] * bend - drawn["foot_offset"]) / (leg + drawn["shank_length"])
     drawn |= {"knee_bend": bend, "hip_bend": under + random.between(-_LEAN, _LEAN)}
     speeds = {"large": 5.9, "medium": 10.3, "small": 11.5}
-    torques = {"large": 120.0 * longer, "medium": 72.0, "small": 24.0}
-    least = {"large": 0.4, "medium": 0.25, "small": 0.3}
+    torques = {"large": 120.0 * longer, "medium": 72.0 * np.sqrt(longer), "small": 24.0}
+    least = {"large": 0.4, "medium": 0.4, "small": 0.3}
     for name, peak in torques.items():
         drawn[f"actuators.{name}.peak_torque"] = peak * torque * random.spread(least[name], 1.6)
         speed = speeds[name] / np.sqrt(size) * random.spread(0.6, 4.0)
