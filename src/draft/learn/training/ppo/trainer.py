@@ -204,8 +204,12 @@ class Trainer:
         if not self._ranks.all(bool(finite)):
             raise self._diverged("observations")
         if isinstance(alg, Ppo):
-            alg.learns_actor = self.iteration >= self._alone
-            if alg.learns_actor:
+            begins = self.iteration >= self._alone
+            if begins and not alg.learns_actor:
+                # At the rate of a new policy the first steps would undo what it can do.
+                alg.learning_rate = alg.least_rate
+            alg.learns_actor = begins
+            if begins:
                 alg.teacher = None
             alg.decay(self._decayed())
         losses = alg.update()
