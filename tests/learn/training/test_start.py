@@ -74,7 +74,9 @@ def test_the_actor_is_that_of_the_file_and_its_noise_too(file: Path, tmp_path: P
     assert (origin.run, origin.iteration) == (str(file), 1)
 
 
-def test_the_critic_learns_alone_at_first(file: Path, tmp_path: Path) -> None:
+def test_the_critic_learns_alone_at_first_and_the_actor_gently_then(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     trainer = started(tmp_path / "run", file)
     alg = learner(trainer)
 
@@ -88,8 +90,17 @@ def test_the_critic_learns_alone_at_first(file: Path, tmp_path: Path) -> None:
     assert alg.learning_rate == rate
     # Steps without a gradient would count in Adam's averages, and the actor's first be too long.
     assert not any(alg.optimizer.state.get(one) for one in alg.actor.parameters())
+    rates: list[float] = []
+    update = alg.update
+
+    def seen() -> dict[str, float]:
+        rates.append(alg.learning_rate)
+        return update()
+
+    monkeypatch.setattr(alg, "update", seen)
     trainer.train(ALONE + 1)
     assert not torch.equal(weights(alg.actor), actor)
+    assert rates == [alg.least_rate]  # Those of a new policy would undo what it can do.
 
 
 def test_values_of_a_critic_that_learns_alone_are_not_clipped(file: Path, tmp_path: Path) -> None:
