@@ -284,9 +284,9 @@ def slot_features(members: Sequence[LeggedRobot]) -> list[tuple[float, ...]]:
     m g L, of no-load speed times sqrt(L / g), and of the inertia about the joint per m L^2, and the
     sine of its angle in the home pose. Of each leg, per L: place of hip and foot ahead of the
     middle of the feet and aside, and the distance from knee to foot. Of the body: logarithms of
-    L per 0.48 m and of mass per 30 kg and cubed scale; a quarter of the number of
-    legs, half the length of a sole per L, and the centre of mass ahead of the middle of the feet
-    and above it, per L. Numbers of slots without a joint are zero.
+    L per 0.48 m and of mass per 30 kg and cubed scale; a quarter of the number of legs,
+    half the length of a sole per L, and the centre of mass ahead of the middle of the feet and
+    above it, per L. Numbers of slots without a joint are zero.
 
     Raises:
         DraftError: as `slots_of`.

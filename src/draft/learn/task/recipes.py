@@ -154,6 +154,7 @@ ANY = Recipe(
         "learning.environments": Change(256, "more worlds learn less from each step"),
         "learning.iterations_any": Change(4000, "24.6 million steps"),
         "learning.kl": Change(0.03, "it is a sum over up to 29 joints"),
+        "learning.least_rate": Change(1e-4, "with 2e-4 steps are twice as large as that asks"),
         "learning.entropy": Change(0.001, "it is a sum over up to 29 joints"),
         "velocity.forward": Change(6.5, "3 sqrt(g L); the robots end the growth before"),
         "velocity.sideways": Change(0.5, "0.23 sqrt(g L)"),

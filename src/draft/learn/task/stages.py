@@ -146,7 +146,7 @@ def any_legs(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
         terms[name].weight *= share
     legs = len(member.feet)
     command.set_largest(*largest_of_any(v, legs), task)
-    if command.growth is not None and legs == _TWO:
+    if command.growth is not None and legs == 2:
         first = command.growth.start
         start = Scaled(_FIRST_ON_TWO_LEGS * first.value, first.power)
         command.growth = command.growth._replace(start=start)
@@ -164,7 +164,7 @@ def any_legs(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
 
 def largest_of_any(numbers: Velocity, legs: int) -> tuple[Scaled, Scaled, Scaled]:
     """Largest |vx|, |vy| and |wz| of stage `any` for robots on a number of legs."""
-    ahead, aside = _ON_TWO_LEGS if legs == _TWO else (1.0, 1.0)
+    ahead, aside = _ON_TWO_LEGS if legs == 2 else (1.0, 1.0)
     forward, sideways = Scaled(ahead * numbers.forward, 0.5), Scaled(aside * numbers.sideways, 0.5)
     return forward, sideways, Scaled(numbers.turn, -0.5)
 
@@ -229,10 +229,9 @@ def _slow(task: Task) -> tuple[Scaled, Scaled, Scaled]:
     return Scaled(p.forward), Scaled(p.sideways), Scaled(p.turn)
 
 
-# Stages of the paper, which a study trains unless its file names others.
-_TWO = 2
 # Shares of the speeds ahead and to the side in stage `any`, and of the first speed ahead.
 _ON_TWO_LEGS, _FIRST_ON_TWO_LEGS = (0.2, 0.5), 0.5
+# Stages of the paper, which a study trains unless its file names others.
 PUBLISHED = (
     Stage("base", base, origin=None),
     Stage("velocity", velocity, test="speed"),
