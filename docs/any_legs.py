@@ -55,21 +55,20 @@ among the numbers of a body: real humanoids that carry it further ahead ran afte
 now, instead of the height of the trunk's frame, which makers put anywhere. That training was ended
 by the clock: bodies on two legs gained by it, and quadrupeds were still slower than before, as
 commands begin small again. What ships is the mean of the weights before and after it, which on
-bodies of validation (another seed) keeps most of both. Robots that fall, and those of the next
-lines, lie outside the numbers of the training or at their ends: ankles that are weak or slow, hips
-whose axes slant and whose knees look aside."""
+bodies of validation (another seed) keeps most of both. Robots that fall lie outside the numbers of
+the training or near their ends, most by weak or slow ankles or slanting hips; but limx_oli, n1 and
+booster lie inside and fall all the same, as many drawn bodies with slanting hips do."""
 INTRODUCTION = """\
 Draft ships one policy for robots of any legs: two, four or six of them, with three to six driven
 joints each. The shipped hexapod, biped and humanoid walk with it; of real robots, nine of ten
-quadrupeds stay up at half a sqrt(g L), and {some} of the bipeds and humanoids at a quarter. It
+quadrupeds stay up at half a sqrt(g L), and two fifths of the bipeds and humanoids at a quarter. It
 observes and moves joints by their place, which is the side, the order from the front and the role
 in the leg, and is told torques, speeds, inertias, lengths and the centre of mass of the body, all
-without units. For
-one robot that is an ordinary small network of its own joints, which NumPy runs in {ms} ms for
-{joints} joints. It has learnt on bodies that Draft draws, of six kinds in one run (`draft train
-any`), and has seen no real robot; but the widths of their draws were chosen anew after looking at
-how earlier policies walked these real robots, so that they are no blind test. It was trained in
-parts: {first} iterations, of which 3846 with a mistake in the code (a world that was given another
+without units. For one robot that is an ordinary small network of its own joints, which NumPy runs
+in {ms} ms for {joints} joints. It has learnt on bodies that Draft draws, of six kinds in one run
+(`draft train any`), and has seen no real robot; but the widths of their draws were chosen anew
+after looking at how earlier policies walked these real robots, so that they are no blind test. It
+was trained in parts: {first} iterations, of which 3846 with a mistake in the code (a world that was given another
 body kept the home pose of the one before) and without a reward for turning, and {second} more
 from there (`draft train any --from any`); its weights are the mean of those before and after these
 (`python -m scripts.mean_of_policies`). Outside the ranges of these bodies, its region of

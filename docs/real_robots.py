@@ -59,9 +59,8 @@ LABELS = {"kick": "kick [m/s]"}
 INTRODUCTION = """\
 What Draft predicts of {count} machines from their makers' descriptions: joints, lengths, torques
 and speeds are the maker's, masses and inertias Draft's, with the machine held out of the trends.
-One policy drives the {driven} quadrupeds whose knees point backwards, and another one climbs; that
-of [any legs](any-legs.md) drives {others} others, with commands up to those of its training, on a
-plane. All were trained on bodies of Draft alone and have seen none of these machines.
+One policy drives the {driven} quadrupeds whose knees point backwards, and another one climbs; they
+were trained on bodies of Draft alone and have seen none of these machines. {others}
 `draft twin FILE --capabilities` measures one robot; [limits](limits.md) tells what the numbers
 leave out.
 
@@ -71,6 +70,10 @@ Physics: contacts with a time constant of 10 ms, targets that arrive up to 15 ms
 of 9 s at each command, kick and step, no command that is faster than those of the training, and
 stairs at 0.3 sqrt(g L) with the leg length L.
 Intervals are those of the roll-outs alone, from 5 to 95 %."""
+OTHERS = """\
+That of [any legs](any-legs.md) drives {count} others, on a plane, with commands up to those of its
+training."""
+UNDRIVEN = "Of the others the closed forms are told."
 RULE = """\
 The rule, stated before the comparison: top speed, step and standing load are limits of a machine.
 Products keep below them, so a prediction below the best published figure of that machine is an
@@ -266,9 +269,9 @@ def page(found: Sequence[dict[str, Any]]) -> str:
 
 
 def _introduction(found: Sequence[dict[str, Any]]) -> list[str]:
-    counts = [len(_by(name, found)) for name in (FAMILY_NAME, ANY_NAME)]
-    driven, others = counts
-    return INTRODUCTION.format(count=len(found), driven=driven, others=others).splitlines()
+    driven, others = (len(_by(name, found)) for name in (FAMILY_NAME, ANY_NAME))
+    words = OTHERS.format(count=others) if others else UNDRIVEN
+    return INTRODUCTION.format(count=len(found), driven=driven, others=words).splitlines()
 
 
 def _by(policy: str, found: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
