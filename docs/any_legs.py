@@ -50,10 +50,10 @@ CAUSES: Mapping[str, str] = {}
 WHY = """\
 The last training met bodies that the ones before had not: humanoids with longer legs under shorter
 torsos, whose centre of mass lies ahead of their feet or behind them, hip pitches whose axes slant,
-slower and faster drives. Policies had leant by the place of the hips, as the centre of mass was not
-among the numbers of a body: real humanoids that carry it further ahead ran after it, and fell. It is
-now, instead of the height of the trunk's frame, which makers put anywhere. That training was ended
-by the clock: bodies on two legs gained by it, and quadrupeds were still slower than before, as
+slower and faster drives. Policies had leant by the place of the hips, as the centre of mass was
+not among the numbers of a body: real humanoids that carry it further ahead ran after it, and fell.
+It is now, instead of the height of the trunk's frame, which makers put anywhere. That training was
+ended by the clock: bodies on two legs gained by it, and quadrupeds were still slower than before, as
 commands begin small again. What ships is the mean of the weights before and after it, which on
 bodies of validation (another seed) keeps most of both. Robots that fall lie outside the numbers of
 the training or near their ends, most by weak or slow ankles or slanting hips; but limx_oli, n1 and
@@ -68,9 +68,9 @@ without units. For one robot that is an ordinary small network of its own joints
 in {ms} ms for {joints} joints. It has learnt on bodies that Draft draws, of six kinds in one run
 (`draft train any`), and has seen no real robot; but the widths of their draws were chosen anew
 after looking at how earlier policies walked these real robots, so that they are no blind test. It
-was trained in parts: {first} iterations, of which 3846 with a mistake in the code (a world that was given another
-body kept the home pose of the one before) and without a reward for turning, and {second} more
-from there (`draft train any --from any`); its weights are the mean of those before and after these
+was trained in parts: {first} iterations, of which 3846 with a mistake in the code (a world that
+was given another body kept the home pose of the one before) and without a reward for turning, and
+{second} more from there (`draft train any --from any`); its weights are the mean of those before and after these
 (`python -m scripts.mean_of_policies`). Outside the ranges of these bodies, its region of
 validity, it takes the nearest numbers that it knows, says so and tries.
 

@@ -60,7 +60,8 @@ INTRODUCTION = """\
 What Draft predicts of {count} machines from their makers' descriptions: joints, lengths, torques
 and speeds are the maker's, masses and inertias Draft's, with the machine held out of the trends.
 One policy drives the {driven} quadrupeds whose knees point backwards, and another one climbs; they
-were trained on bodies of Draft alone and have seen none of these machines. {others}
+were trained on bodies of Draft alone and have seen none of these machines.
+{others}
 `draft twin FILE --capabilities` measures one robot; [limits](limits.md) tells what the numbers
 leave out.
 
