@@ -53,8 +53,8 @@ torsos, whose centre of mass lies ahead of their feet or behind them, hip pitche
 slower and faster drives. Policies had leant by the place of the hips, as the centre of mass was
 not among the numbers of a body: real humanoids that carry it further ahead ran after it, and fell.
 It is now, instead of the height of the trunk's frame, which makers put anywhere. That training was
-ended by the clock: bodies on two legs gained by it, and quadrupeds were still slower than before, as
-commands begin small again. What ships is the mean of the weights before and after it, which on
+ended by the clock: bodies on two legs gained by it, and quadrupeds were still slower than before,
+as commands begin small again. What ships is the mean of the weights before and after it, which on
 bodies of validation (another seed) keeps most of both. Robots that fall lie outside the numbers of
 the training or near their ends, most by weak or slow ankles or slanting hips; but limx_oli, n1 and
 booster lie inside and fall all the same, as many drawn bodies with slanting hips do."""
@@ -70,9 +70,9 @@ in {ms} ms for {joints} joints. It has learnt on bodies that Draft draws, of six
 after looking at how earlier policies walked these real robots, so that they are no blind test. It
 was trained in parts: {first} iterations, of which 3846 with a mistake in the code (a world that
 was given another body kept the home pose of the one before) and without a reward for turning, and
-{second} more from there (`draft train any --from any`); its weights are the mean of those before and after these
-(`python -m scripts.mean_of_policies`). Outside the ranges of these bodies, its region of
-validity, it takes the nearest numbers that it knows, says so and tries.
+{second} more from there (`draft train any --from any`); its weights are the mean of those before
+and after these (`python -m scripts.mean_of_policies`). Outside the ranges of these bodies, its
+region of validity, it takes the nearest numbers that it knows, says so and tries.
 
 In this page velocities are per sqrt(g L) and rates of turn per sqrt(g / L), with the leg length L.
 Roll-outs last {seconds:g} s from noisy starts, with the delays of the training and five times its
