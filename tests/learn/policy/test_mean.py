@@ -22,7 +22,8 @@ def test_shares_of_nothing_and_of_all_are_the_policies_themselves(
     share: float, tmp_path: Path
 ) -> None:
     mean, divisor, layers = read(ANY).layers()
-    seen = mean + divisor * np.random.default_rng(0).normal(size=len(mean)).astype(np.float32)
+    noise = np.random.default_rng(0).normal(size=len(mean))
+    seen = (mean + divisor * noise).astype(np.float32)
     after, out = tmp_path / "after.onnx", tmp_path / "out.onnx"
     *others, (weight, bias) = layers
     changed = [*others, (weight, bias + 1.0)]
