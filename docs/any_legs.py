@@ -46,7 +46,11 @@ PICTURES, SHOTS, SECONDS, SIZE, WIDTH = 12, 6, 4.0, (640, 360), 720
 _MASSES = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 BEFORE = 5696  # Iterations of the trainings that the policy goes on from.
 # Why robots do not walk, by name, as found by looking at them.
-CAUSES: Mapping[str, str] = {}
+CAUSES: Mapping[str, str] = {
+    "agibot_x1": "Its description limits no joint, and Draft bends its knees backward.",
+    "anymal_d": "It sinks to two thirds of its height at rest, near where a robot counts as fallen.",
+    "icub": "Its x axis points backward.",
+}
 WHY = """\
 The last training met bodies that the ones before had not: humanoids with longer legs under shorter
 torsos, whose centre of mass lies ahead of their feet or behind them, hip pitches whose axes slant,
