@@ -48,7 +48,7 @@ BEFORE = 5696  # Iterations of the trainings that the policy goes on from.
 # Why robots do not walk, by name, as found by looking at them.
 CAUSES: Mapping[str, str] = {
     "agibot_x1": "Its description limits no joint, and Draft bends its knees backward.",
-    "anymal_d": "It sinks to two thirds of its height at rest, near where a robot counts as fallen.",
+    "anymal_d": "It sinks to two thirds of its height, near where a robot counts as fallen.",
     "icub": "Its x axis points backward.",
 }
 WHY = """\
