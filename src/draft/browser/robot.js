@@ -27,7 +27,7 @@ export class Robot {
    * @param {import("draft/network").Network | null} network
    * @param {Record<string, number[]>} numbers of the body that its start and its policy need, each
    *   by joint or whole: home_position, forward, sign, home, action_scale, stiffness, damping,
-   *   peak_torque, stall_torque, no_load_speed, features
+   *   peak_torque, stall_torque, no_load_speed, features, trim
    */
   constructor(mujoco, robot, network, numbers) {
     this.mujoco = mujoco;
@@ -56,6 +56,7 @@ export class Robot {
     this.sensors = robot.policy ? ["imu_lin_vel", "imu_ang_vel"].map(
       (name) => this.model.sensor_adr[id(kinds.mjOBJ_SENSOR, name)]) : [];
     this.action = new Float64Array(joints.length);
+    this.shift = new Float64Array(3); // Of the command, by the policy's trim.
     this.torque = new Float64Array(joints.length);
     this.observation = new Float32Array(network ? network.mean.length : 0);
     this.period = robot.policy ? Math.round(robot.policy.period / robot.policy.timestep) : 1;
@@ -169,6 +170,7 @@ export class Robot {
     this.qpos.set(other.data.qpos);
     this.qvel.set(other.data.qvel);
     this.action.set(other.action);
+    this.shift.set(other.shift);
     this.since = other.since;
     this.lying = other.lying;
     this.mujoco.mj_forward(this.model, this.data);
@@ -191,6 +193,7 @@ export class Robot {
     if (moved && Number.isFinite(x + y)) { this.qpos[0] = x; this.qpos[1] = y; }
     this.q.forEach((at, i) => { this.qpos[at] += this.policy?.offsets[i] ?? 0; });
     this.action.fill(0);
+    this.shift.fill(0);
     this.torque.fill(0);
     this.since = 0;
     this.lying = NaN;
@@ -238,11 +241,30 @@ export class Robot {
         for (let i = 0; i < q.length; i++) if (!policy.rolls[i]) put(numbers.sign[i] * (qpos[q[i]] - numbers.home[i]));
       } else if (name === "joint_vel") for (let i = 0; i < v.length; i++) put(numbers.sign[i] * qvel[v[i]]);
       else if (name === "actions") this.action.forEach(put);
-      else if (name === "command") this.command.forEach(put);
+      else if (name === "command") this.shifted().forEach(put);
       else if (name === "design") numbers.features.forEach(put);
       else throw new Error(`no page computes the term '${name}' of the policy`);
     }
     return observation;
+  }
+
+  /** Command that the policy observes, as `Trim.shifted`. */
+  shifted() {
+    const ends = this.numbers.trim.slice(4);
+    return this.command.map((asked, i) => {
+      const end = Math.max(ends[i], Math.abs(asked));
+      return Math.min(end, Math.max(-end, asked + this.shift[i]));
+    });
+  }
+
+  /** Shift the command of the next action, as `Trim.next`. */
+  trim() {
+    const { numbers, sensordata, sensors: [linear, angular], shift } = this;
+    const [rate, ...most] = numbers.trim, period = this.policy?.period ?? 0;
+    [sensordata[linear], sensordata[linear + 1], sensordata[angular + 2]].forEach((moving, i) => {
+      const next = shift[i] + rate * period * (this.command[i] - moving);
+      shift[i] = Math.min(most[i], Math.max(-most[i], next));
+    });
   }
 
   /** One physics step; the policy acts at its rate, as in `Controller.step`. */
@@ -252,6 +274,7 @@ export class Robot {
     if (!policy || !network) return;
     if (this.since === 0) {
       this.action.set(network.run(this.observe()));
+      this.trim();
     }
     this.since = (this.since + 1) % this.period;
     for (let i = 0; i < this.q.length; i++) {

@@ -140,6 +140,7 @@ def body_numbers(model: Model, chosen: Fit) -> dict[str, list[float]]:
     return {
         "home_position": start_position(model, chosen).tolist(),
         "forward": [policy.forward],
+        "trim": policy.trim.numbers(),
         **numbers,
     }
 

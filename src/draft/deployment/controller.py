@@ -102,6 +102,7 @@ class Controller:
         """Forget the last action and a stop; `step` must follow within the time-out."""
         self.action = np.zeros(len(self.names))
         self.stop, self._first = "", True
+        self._shift = np.zeros(3)  # Of the command, by its trim.
         self._last = now
 
     def step(self, sensors: Sensors, command: Command, now: float) -> Output:
@@ -120,7 +121,8 @@ class Controller:
             asked = np.asarray(command.velocity, float)
             if not abs(now - command.time) <= n["command_timeout"]:
                 asked = np.zeros(3)
-            self.observation = self._observe(sensors, np.clip(asked, -n["command"], n["command"]))
+            asked = np.clip(asked, -n["command"], n["command"])
+            self.observation = self._observe(sensors, self._shifted(sensors, asked))
             self._first = False
             action = self.network(self.observation)
             if np.isfinite(action).all():
@@ -128,6 +130,17 @@ class Controller:
             else:
                 self.stop = "the action is not finite"
         return self.output()
+
+    def _shifted(self, sensors: Sensors, asked: Array) -> Array:
+        """Command that the policy observes; the velocity that it misses by shifts the next one."""
+        n, now = self.numbers, self._shift
+        if "trim_rate" not in n:
+            return asked
+        moving = np.append(sensors.estimated_base_lin_vel, sensors.base_ang_vel)[[0, 1, 5]]
+        most, ends = n["trim_most"], np.maximum(n["trim_ends"], np.abs(asked))
+        step = n["trim_rate"] * n["control_period"] * (asked - moving)
+        self._shift = np.clip(now + step, -most, most)
+        return np.clip(asked + now, -ends, ends)
 
     def output(self) -> Output:
         """Targets and gains of the last action, or those of a stop: damping alone."""

@@ -13,6 +13,21 @@ from draft.deployment.observations import TERMS
 from draft.learn.policy.policy import Policy
 
 _PER_LINE = 12
+# Code of a policy whose command its trim shifts: `draft.learn.policy.trim`.
+_TRIM = {
+    "TRIM_START": "    shift_ = {};\n",
+    "TRIM_STATE": "  Vector shift_{};  // Of the command, by what the velocity missed it by.\n",
+    "TRIM_STEP": """\
+      const Vector& linear = sensors.estimated_base_lin_vel;
+      const Vector moving{linear[0], linear[1], sensors.base_ang_vel[2]};
+      for (std::size_t i = 0; i < 3; ++i) {
+        const double now = shift_[i], end = std::max(TRIM_ENDS[i], std::abs(asked[i]));
+        const double next = now + TRIM_RATE * CONTROL_PERIOD * (asked[i] - moving[i]);
+        shift_[i] = std::clamp(next, -TRIM_MOST[i], TRIM_MOST[i]);
+        asked[i] = std::clamp(asked[i] + now, -end, end);
+      }
+""",
+}
 
 
 def sources(numbers: Mapping[str, Number], policy: Policy) -> dict[str, str]:
@@ -37,6 +52,7 @@ def sources(numbers: Mapping[str, Number], policy: Policy) -> dict[str, str]:
             for one in estimates
         ),
         "OBSERVE": "\n".join(_observed(policy)),
+        **(_TRIM if policy.trim.rate else dict.fromkeys(_TRIM, "")),
     }
     found = {}
     for name in ("controller.hpp", "main.cpp"):

@@ -81,6 +81,7 @@ def numbers(policy: Policy, member: LeggedRobot) -> dict[str, Number]:
         "no_load_speed": Number(no_load, "rad/s", "speed of the joint without a load"),
         "speed_limit": Number(_SPEEDS * no_load, "rad/s", "speed at which a joint stops"),
         "design": Number(policy.features, "1", "features of the body"),
+        **_trim(policy),
         **_network(policy),
     }
     for name, number in found.items():
@@ -88,6 +89,19 @@ def numbers(policy: Policy, member: LeggedRobot) -> dict[str, Number]:
             cause = f"{name.replace('_', ' ')} of {policy.file} is not finite"
             raise DraftError(cause, "export the policy again")
     return found
+
+
+def _trim(policy: Policy) -> dict[str, Number]:
+    """Numbers of the trim of a policy that has one."""
+    trim = policy.trim
+    if not trim.rate:
+        return {}
+    unit = "m/s, m/s, rad/s"
+    return {
+        "trim_rate": Number(trim.rate, "1/s", "rate at which errors of the velocity add up"),
+        "trim_most": Number(trim.most, unit, "largest shift of the command by them, either way"),
+        "trim_ends": Number(trim.ends, unit, "largest command with the shift, either way"),
+    }
 
 
 def _network(policy: Policy) -> dict[str, Number]:

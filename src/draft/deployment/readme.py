@@ -16,6 +16,7 @@ from draft.learn.policy.validity import Fit
 from draft.model import Model
 
 _LIMITS = ("timeout", "command_timeout", "tilt", "gravity_error", "margin", "command")
+_TRIM = ("trim_rate", "trim_most", "trim_ends")
 _OF_JOINTS = {
     "home": "home",
     "low": "low",
@@ -76,7 +77,8 @@ def readme(
         "Torques, speeds and gains are those at the joint, after the gearbox and the transmission.",
         "## Limits and safe stop",
         _STOP,
-        "\n".join(_limits(numbers)),
+        "\n".join(_table(numbers, _LIMITS)),
+        *(_shifting(numbers) if _TRIM[0] in numbers else ()),
         "The network is evaluated in double precision from the weights of the ONNX file, which are "
         "of single precision: an evaluation in single precision differs by some 1e-6.",
     ]
@@ -188,10 +190,20 @@ training as its end. A second stop must not need this program: a switch that ope
 drives."""
 
 
-def _limits(numbers: Mapping[str, Number]) -> Iterator[str]:
+def _shifting(numbers: Mapping[str, Number]) -> Iterator[str]:
+    yield "## Trim"
+    yield (
+        "This policy was not trained with this robot. The error of its velocity adds up and shifts "
+        "the command that it observes, so that a constant drift ends; `start` forgets the shift. A "
+        "robot that is held, or a wrong estimate of its velocity, shifts it to its bounds."
+    )
+    yield "\n".join(_table(numbers, _TRIM))
+
+
+def _table(numbers: Mapping[str, Number], names: Sequence[str]) -> Iterator[str]:
     yield "| name | value | what it is |"
     yield "|---|---|---|"
-    for name in _LIMITS:
+    for name in names:
         value, unit, doc = numbers[name]
         text = ", ".join(f"{x:.3g}" for x in np.ravel(np.asarray(value, float)))
         yield f"| `{name}` | {text} {unit if unit != '1' else ''} | {doc} |"

@@ -15,6 +15,7 @@ from draft.learn.policy.policy import DESIGN, Policy
 from draft.learn.task.recipes import LAPTOP
 
 _OFFSET = LAPTOP.config.episodes.joints  # Largest offset of a joint at the start [rad].
+Array = NDArray[np.float64]
 _HIDDEN = 5  # Group of the robot's geoms, which a height scan ignores.
 
 
@@ -60,7 +61,8 @@ class Controller:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
         self._decimation = round(policy.control_period / policy.timestep)
         self._action = np.zeros(len(policy.joints))
-        self._past: list[Mapping[str, NDArray[np.float64]]] = []  # Terms of the last steps.
+        self._past: list[Mapping[str, Array]] = []  # Terms of the last steps.
+        self._shift = np.zeros(3)  # Of the command, by the policy's trim.
         self._since = 0
         # Rays use a copy in which the robot's own geoms have a group of their own.
         self._sight = copy.copy(model)
@@ -82,7 +84,7 @@ class Controller:
     def resume(self, other: Controller) -> None:
         """Continue where another controller of the same joints stopped."""
         self._action, self._since = other._action.copy(), other._since
-        self._past = list(other._past)
+        self._past, self._shift = list(other._past), other._shift.copy()
 
     def reset(self, data: mujoco.MjData, seed: int = 0) -> None:
         """Put the robot near its home pose, at the model's first keyframe if it has one.
@@ -100,6 +102,7 @@ class Controller:
             mujoco.mj_resetData(self.model, data)
         data.qpos[self._q] = self.policy.home + start_offsets(self.policy, seed)
         self._action, self._past = np.zeros_like(self._action), []
+        self._shift = np.zeros(3)
         self._since = 0
         mujoco.mj_forward(self.model, data)
 
@@ -118,6 +121,10 @@ class Controller:
             self._action = self.policy(self._joined(parts)).astype(float)
             steps = [*self._past, parts]
             self._past = steps[max(0, len(steps) + 1 - max(self.policy.history)) :]
+            moving = np.append(parts["base_lin_vel"][:2], parts["base_ang_vel"][2])
+            self._shift = self.policy.trim.next(
+                self._shift, command, moving, self.policy.control_period
+            )
             if not np.isfinite(self._action).all():
                 cause = "the policy or the simulation gives values that are not finite"
                 raise DraftError(cause, "restart from another state")
@@ -139,7 +146,7 @@ class Controller:
         """
         return self._joined(self._parts(data, command))
 
-    def _joined(self, parts: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float32]:
+    def _joined(self, parts: Mapping[str, Array]) -> NDArray[np.float32]:
         """Observation of the terms of now and those of the steps before; at first of now alone."""
         found, most = [], max(self.policy.history)
         steps = [*self._past, parts]
@@ -148,31 +155,31 @@ class Controller:
             found += [one[name] for one in steps[-count:]]
         return np.concatenate(found).astype(np.float32)
 
-    def _parts(self, data: mujoco.MjData, command: ArrayLike) -> Mapping[str, NDArray[np.float64]]:
+    def _parts(self, data: mujoco.MjData, command: ArrayLike) -> Mapping[str, Array]:
         """Terms of now."""
         mujoco.mj_forward(self.model, data)
         turn = data.xmat[self._trunk].reshape(3, 3)
         sign = self.policy.sign
         linear, angular = (data.sensordata[at : at + 3] for at in self._sensors)
-        parts: dict[str, NDArray[np.float64]] = {
+        parts: dict[str, Array] = {
             "base_lin_vel": linear.copy(),
             "base_ang_vel": angular.copy(),
             "projected_gravity": -turn[2],
             ANGLES: (sign * (data.qpos[self._q] - self.policy.home))[~self.policy.rolls],
             "joint_vel": sign * data.qvel[self._v],
             "actions": self._action,
-            "command": np.asarray(command, float),
+            "command": self.policy.trim.shifted(command, self._shift),
             DESIGN: self.policy.features,
         }
         if len(self.policy.scan_points):
             parts["height_scan"] = self._scan(data, turn) / self.policy.scan_range
         return parts
 
-    def velocity(self, data: mujoco.MjData) -> NDArray[np.float64]:
+    def velocity(self, data: mujoco.MjData) -> Array:
         """Velocity of the trunk in its own frame, as last observed [m/s], shape (3,)."""
         return data.sensordata[self._sensors[0] : self._sensors[0] + 3]
 
-    def _scan(self, data: mujoco.MjData, turn: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _scan(self, data: mujoco.MjData, turn: Array) -> Array:
         """Height of the trunk above the points of the scan [m], shape (points,)."""
         reach = self.policy.scan_range
         heading = turn[:2, 0] / max(float(np.linalg.norm(turn[:2, 0])), 1e-6)
@@ -204,7 +211,7 @@ _TERMS = frozenset(
 )
 
 
-def start_offsets(policy: Policy, seed: int) -> NDArray[np.float64]:
+def start_offsets(policy: Policy, seed: int) -> Array:
     """Offsets of the joints at the start [rad], shape (joints,)."""
     drawn = np.random.default_rng(seed).uniform(-_OFFSET, _OFFSET, len(policy.joints))
     return policy.sign * drawn

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from draft.errors import DraftError, suggest
 from draft.learn.policy.matching import Structure, rolls_of_texts
 from draft.learn.policy.onnx_file import Network, read
+from draft.learn.policy.trim import NONE, Trim
 from draft.learn.task.constants import CONTACT_TIME
 from draft.learn.task.scan import scan_points
 
@@ -86,6 +87,7 @@ class Policy:
         leg_length: thigh plus shank of the design [m].
         action_std: standard deviation of the actions at the end of the training, shape (joints,);
             (0,) for a file that does not state it.
+        trim: what shifts its command [1/s, m/s, rad/s]; of one kind of robot nothing does.
     """
 
     file: Path
@@ -118,6 +120,7 @@ class Policy:
     known: Array
     leg_length: float
     action_std: Array
+    trim: Trim = NONE
 
     def __repr__(self) -> str:
         sizes = f"{self.network.size} observations, {len(self.joints)} actions"
@@ -316,4 +319,5 @@ def _policy(file: Path, network: Network) -> Policy:
         else np.zeros((2, 0)),
         leg_length=float(texts["leg_length"]),
         action_std=numbers("action_std") if "action_std" in texts else np.zeros(0),
+        trim=Trim.of([*numbers("trim")]) if "trim" in texts else NONE,
     )

@@ -35,6 +35,7 @@ from draft.learn.policy.matching import structure_of
 from draft.learn.policy.onnx_file import Network, of_layers, read
 from draft.learn.policy.policy import ANY, Policy, with_network
 from draft.learn.policy.region import SAME, Departure
+from draft.learn.policy.trim import Trim
 from draft.values import Array
 
 _REMEDY = "use the one that ships, or one of 'draft train any'"
@@ -43,6 +44,9 @@ _NARROW = 0.1  # Width of a range of features below which it counts as this wide
 LAYOUT = "slots, knees by their bend, centre of mass"
 # Largest divisor of an observation that is constant in the training, with the epsilon of rsl-rl.
 _CONSTANT = 1.01e-2
+# Trim, chosen on generated bodies: rate per sqrt(L / g), and largest shift per sqrt(g L), of wz
+# times sqrt(L / g).
+_RATE, _MOST = 0.1, (0.2, 0.2, 0.15)
 
 
 @dataclass(frozen=True, repr=False)
@@ -87,10 +91,15 @@ class LegsPolicy:
 
     def commands_for(self, member: LeggedRobot) -> Array:
         """Largest |vx|, |vy| [m/s] and |wz| [rad/s] that were commanded, at the size of a robot."""
+        return self._commands(len(member.feet)) * _speeds(member)
+
+    def trim(self, legs: int) -> Trim:
+        """Trim of a robot with this number of legs, in units of sqrt(L / g) and sqrt(g L)."""
+        return Trim(_RATE, np.array(_MOST), self._commands(legs))
+
+    def _commands(self, legs: int) -> Array:
         least = np.min([*self.commands.values()], axis=0)
-        rate = math.sqrt(GRAVITY / member.leg_length)
-        speed = rate * member.leg_length
-        return np.array(self.commands.get(len(member.feet), least)) * (speed, speed, rate)
+        return np.array(self.commands.get(legs, least))
 
     def nearest(self, own: Array, legs: int) -> Array:
         """Features of a robot as the nearest of the training, shape (FEATURES,).
@@ -147,6 +156,7 @@ class LegsPolicy:
         )
         peak, most = np.array(member.peak_torque), self.commands_for(member)
         timestep = float(texts["physics_timestep"])
+        trim = self.trim(len(member.feet))
         return Policy(
             file=self.file,
             network=self._network(
@@ -180,6 +190,11 @@ class LegsPolicy:
             known=np.zeros((2, 0)),
             leg_length=member.leg_length,
             action_std=self._noise(slots),
+            trim=Trim(
+                trim.rate * math.sqrt(GRAVITY / member.leg_length),
+                trim.most * _speeds(member),
+                most,
+            ),
         )
 
     def _noise(self, slots: Slots) -> Array:
@@ -323,6 +338,13 @@ def open_for(path: str | Path, members: Sequence[LeggedRobot]) -> Policy:
         cause = f"{path} becomes the policy of one robot, and this training has {len(members)}"
         raise DraftError(cause, 'train one design, or start with `origin="scratch"`')
     return found.of_robot(members[0])
+
+
+def _speeds(member: LeggedRobot) -> Array:
+    """Units of vx, vy [m/s] and wz [rad/s] of a robot, shape (3,)."""
+    rate = math.sqrt(GRAVITY / member.leg_length)
+    speed = rate * member.leg_length
+    return np.array([speed, speed, rate])
 
 
 def _ends(text: str) -> tuple[float, float]:

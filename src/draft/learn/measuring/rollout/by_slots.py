@@ -9,6 +9,7 @@ import torch
 from mjlab.envs import ManagerBasedRlEnv
 from tensordict import TensorDict
 
+from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.padding import MOST, places, size, starts, units
 from draft.learn.bodies.slots import FEATURES, SLOTS, describe
 from draft.learn.policy.reduced import LegsPolicy
@@ -16,6 +17,9 @@ from draft.learn.task.world.access import robot_of
 
 Policy = Callable[[TensorDict], torch.Tensor]
 _GROUP = "actor"
+_FIRST = starts(_GROUP)
+_ASKED = [_FIRST["command"] + i for i in range(3)]
+_MOVING = [_FIRST["base_lin_vel"], _FIRST["base_lin_vel"] + 1, _FIRST["base_ang_vel"] + 2]
 
 
 def by_slots(policy: LegsPolicy, device: str) -> Callable[[ManagerBasedRlEnv], Policy]:
@@ -34,7 +38,7 @@ def by_slots(policy: LegsPolicy, device: str) -> Callable[[ManagerBasedRlEnv], P
         lengths = [one[0] for one in manager.group_obs_term_dim[_GROUP]]
         terms = list(zip(manager.active_terms[_GROUP], lengths, strict=True))
         entries, factors, fixed, slots, signs = [], [], [], [], []
-        unused, first = size(_GROUP), starts(_GROUP)["design"]
+        unused, first = size(_GROUP), _FIRST["design"]
         for member in robot.cfg.members:
             own, features = describe(member)
             found = places(_GROUP, terms, own)
@@ -52,11 +56,20 @@ def by_slots(policy: LegsPolicy, device: str) -> Callable[[ManagerBasedRlEnv], P
             np.array(one)[worlds] for one in (entries, factors, fixed, slots, signs)
         )
         rows = np.arange(len(worlds))[:, None]
+        # A mixture's topologies have an environment each, so all have as many legs.
+        trim = policy.trim(len(robot.cfg.members[0].feet))
+        lengths = np.array([member.leg_length for member in robot.cfg.members])[worlds]
+        period = env.step_dt / np.sqrt(lengths / GRAVITY)[:, None]
+        shift = np.zeros((len(worlds), 3))
 
         def act(seen: TensorDict) -> torch.Tensor:
             padded = constant.copy()
             np.add.at(padded, (rows, entry), seen[_GROUP].cpu().numpy() * factor)
             padded = padded[:, :unused].clip(-MOST, MOST)
+            shift[env.episode_length_buf.cpu().numpy() == 0] = 0.0
+            asked, moving = padded[:, _ASKED], padded[:, _MOVING]
+            padded[:, _ASKED] = trim.shifted(asked, shift)
+            shift[:] = trim.next(shift, asked, moving, period)
             wide = policy.network(padded.astype(np.float32))
             still = np.append(wide, np.zeros((len(wide), 1), wide.dtype), axis=1)
             return torch.from_numpy((still[rows, slot] * sign).astype(np.float32)).to(device)
