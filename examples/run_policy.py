@@ -27,22 +27,22 @@ data = mujoco.MjData(model)
 data.qpos[:] = home_position(design)
 data.qpos[7:] += np.random.default_rng(0).uniform(-0.1, 0.1, len(policy.home))
 
-action, shift = np.zeros(len(policy.home)), np.zeros(3)
+action, trim = np.zeros(len(policy.home)), np.zeros(5)
 while data.time < 10.0:
     mujoco.mj_forward(model, data)
     linear, angular = data.sensor("imu_lin_vel").data, data.sensor("imu_ang_vel").data
     observation = (
         linear,  # [m/s], in the trunk's frame
         angular,  # [rad/s]
-        -data.xmat[1][6:],  # gravity's direction in the trunk's frame
+        policy.trim.gravity(-data.xmat[1][6:], trim),  # direction in the trunk's frame
         data.qpos[7:] - policy.home,  # [rad]
         data.qvel[6:],  # [rad/s]
         action,  # the last one
-        policy.trim.shifted(command, shift),  # vx, vy [m/s], wz [rad/s]
+        policy.trim.command(command, trim),  # vx, vy [m/s], wz [rad/s]
     )
     action = policy(np.concatenate(observation))
-    moving = (*linear[:2], angular[2])  # What the policy of all legs misses by shifts its command.
-    shift = policy.trim.next(shift, command, moving, policy.control_period)
+    moving = (*linear[:2], angular[2])  # The policy of all legs adds up by how much it misses.
+    trim = policy.trim.next(trim, command, moving, policy.control_period)
     for _ in range(round(policy.control_period / policy.timestep)):
         data.qfrc_applied[6:] = policy.torque(action, data.qpos[7:], data.qvel[6:])
         mujoco.mj_step(model, data)

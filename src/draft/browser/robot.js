@@ -56,7 +56,7 @@ export class Robot {
     this.sensors = robot.policy ? ["imu_lin_vel", "imu_ang_vel"].map(
       (name) => this.model.sensor_adr[id(kinds.mjOBJ_SENSOR, name)]) : [];
     this.action = new Float64Array(joints.length);
-    this.shift = new Float64Array(3); // Of the command, by the policy's trim.
+    this.state = new Float64Array(5); // Of the policy's trim.
     this.torque = new Float64Array(joints.length);
     this.observation = new Float32Array(network ? network.mean.length : 0);
     this.period = robot.policy ? Math.round(robot.policy.period / robot.policy.timestep) : 1;
@@ -170,7 +170,7 @@ export class Robot {
     this.qpos.set(other.data.qpos);
     this.qvel.set(other.data.qvel);
     this.action.set(other.action);
-    this.shift.set(other.shift);
+    this.state.set(other.state);
     this.since = other.since;
     this.lying = other.lying;
     this.mujoco.mj_forward(this.model, this.data);
@@ -193,7 +193,7 @@ export class Robot {
     if (moved && Number.isFinite(x + y)) { this.qpos[0] = x; this.qpos[1] = y; }
     this.q.forEach((at, i) => { this.qpos[at] += this.policy?.offsets[i] ?? 0; });
     this.action.fill(0);
-    this.shift.fill(0);
+    this.state.fill(0);
     this.torque.fill(0);
     this.since = 0;
     this.lying = NaN;
@@ -236,34 +236,36 @@ export class Robot {
     for (const [name] of policy.terms) {
       if (name === "base_lin_vel") for (let i = 0; i < 3; i++) put(sensordata[this.sensors[0] + i]);
       else if (name === "base_ang_vel") for (let i = 0; i < 3; i++) put(sensordata[this.sensors[1] + i]);
-      else if (name === "projected_gravity") for (let i = 0; i < 3; i++) put(-this.xmat[9 * this.trunk + 6 + i]);
+      else if (name === "projected_gravity") for (let i = 0; i < 3; i++) put((this.state[3 + i] ?? 0) - this.xmat[9 * this.trunk + 6 + i]);
       else if (name === "joint_pos") {
         for (let i = 0; i < q.length; i++) if (!policy.rolls[i]) put(numbers.sign[i] * (qpos[q[i]] - numbers.home[i]));
       } else if (name === "joint_vel") for (let i = 0; i < v.length; i++) put(numbers.sign[i] * qvel[v[i]]);
       else if (name === "actions") this.action.forEach(put);
-      else if (name === "command") this.shifted().forEach(put);
+      else if (name === "command") this.asked().forEach(put);
       else if (name === "design") numbers.features.forEach(put);
       else throw new Error(`no page computes the term '${name}' of the policy`);
     }
     return observation;
   }
 
-  /** Command that the policy observes, as `Trim.shifted`. */
-  shifted() {
-    const ends = this.numbers.trim.slice(4);
+  /** Command that the policy observes, as `Trim.command`. */
+  asked() {
+    const ends = this.numbers.trim.slice(10);
     return this.command.map((asked, i) => {
       const end = Math.max(ends[i], Math.abs(asked));
-      return Math.min(end, Math.max(-end, asked + this.shift[i]));
+      return Math.min(end, Math.max(-end, asked + this.state[i]));
     });
   }
 
-  /** Shift the command of the next action, as `Trim.next`. */
+  /** Trim the next action, as `Trim.next`. */
   trim() {
-    const { numbers, sensordata, sensors: [linear, angular], shift } = this;
-    const [rate, ...most] = numbers.trim, period = this.policy?.period ?? 0;
-    [sensordata[linear], sensordata[linear + 1], sensordata[angular + 2]].forEach((moving, i) => {
-      const next = shift[i] + rate * period * (this.command[i] - moving);
-      shift[i] = Math.min(most[i], Math.max(-most[i], next));
+    const { numbers: { trim }, command, sensordata, sensors: [linear, angular], state } = this;
+    const period = this.policy?.period ?? 0;
+    const moving = [sensordata[linear], sensordata[linear + 1], sensordata[angular + 2]];
+    const missing = moving.map((one, i) => command[i] - one);
+    [...missing, -missing[0], -missing[1]].forEach((error, i) => {
+      const most = trim[5 + i];
+      state[i] = Math.min(most, Math.max(-most, state[i] + trim[i] * period * error));
     });
   }
 

@@ -6,7 +6,7 @@ README.md says what every number is. Arrays over joints have the order of `Contr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -102,7 +102,7 @@ class Controller:
         """Forget the last action and a stop; `step` must follow within the time-out."""
         self.action = np.zeros(len(self.names))
         self.stop, self._first = "", True
-        self._shift = np.zeros(3)  # Of the command, by its trim.
+        self._trim = np.zeros(5)  # Added to command and gravity.
         self._last = now
 
     def step(self, sensors: Sensors, command: Command, now: float) -> Output:
@@ -122,7 +122,7 @@ class Controller:
             if not abs(now - command.time) <= n["command_timeout"]:
                 asked = np.zeros(3)
             asked = np.clip(asked, -n["command"], n["command"])
-            self.observation = self._observe(sensors, self._shifted(sensors, asked))
+            self.observation = self._observe(*self._trimmed(sensors, asked))
             self._first = False
             action = self.network(self.observation)
             if np.isfinite(action).all():
@@ -131,16 +131,17 @@ class Controller:
                 self.stop = "the action is not finite"
         return self.output()
 
-    def _shifted(self, sensors: Sensors, asked: Array) -> Array:
-        """Command that the policy observes; the velocity that it misses by shifts the next one."""
-        n, now = self.numbers, self._shift
+    def _trimmed(self, sensors: Sensors, asked: Array) -> tuple[Sensors, Array]:
+        """What the policy observes; the velocity that it misses by trims what it observes next."""
+        n, now = self.numbers, self._trim
         if "trim_rate" not in n:
-            return asked
+            return sensors, asked
         moving = np.append(sensors.estimated_base_lin_vel, sensors.base_ang_vel)[[0, 1, 5]]
+        errors = np.append(asked - moving, moving[:2] - asked[:2])
         most, ends = n["trim_most"], np.maximum(n["trim_ends"], np.abs(asked))
-        step = n["trim_rate"] * n["control_period"] * (asked - moving)
-        self._shift = np.clip(now + step, -most, most)
-        return np.clip(asked + now, -ends, ends)
+        self._trim = np.clip(now + n["trim_rate"] * n["control_period"] * errors, -most, most)
+        gravity = np.add(sensors.projected_gravity, np.append(now[3:], 0.0))
+        return replace(sensors, projected_gravity=gravity), np.clip(asked + now[:3], -ends, ends)
 
     def output(self) -> Output:
         """Targets and gains of the last action, or those of a stop: damping alone."""

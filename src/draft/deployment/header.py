@@ -13,18 +13,28 @@ from draft.deployment.observations import TERMS
 from draft.learn.policy.policy import Policy
 
 _PER_LINE = 12
-# Code of a policy whose command its trim shifts: `draft.learn.policy.trim`.
+# Code of a policy that has a trim: `draft.learn.policy.trim`.
 _TRIM = {
-    "TRIM_START": "    shift_ = {};\n",
-    "TRIM_STATE": "  Vector shift_{};  // Of the command, by what the velocity missed it by.\n",
+    "TRIM_START": "    trim_ = {};\n",
+    "TRIM_STATE": "  std::array<double, 5> trim_{};  // Added to command and gravity.\n",
+    "TRIM_SEEN": "seen",
     "TRIM_STEP": """\
       const Vector& linear = sensors.estimated_base_lin_vel;
       const Vector moving{linear[0], linear[1], sensors.base_ang_vel[2]};
+      Sensors seen = sensors;
+      std::array<double, 5> errors;
+      for (std::size_t i = 0; i < 3; ++i) errors[i] = asked[i] - moving[i];
+      for (std::size_t i = 0; i < 2; ++i) {
+        errors[3 + i] = -errors[i];
+        seen.projected_gravity[i] += trim_[3 + i];
+      }
       for (std::size_t i = 0; i < 3; ++i) {
-        const double now = shift_[i], end = std::max(TRIM_ENDS[i], std::abs(asked[i]));
-        const double next = now + TRIM_RATE * CONTROL_PERIOD * (asked[i] - moving[i]);
-        shift_[i] = std::clamp(next, -TRIM_MOST[i], TRIM_MOST[i]);
-        asked[i] = std::clamp(asked[i] + now, -end, end);
+        const double end = std::max(TRIM_ENDS[i], std::abs(asked[i]));
+        asked[i] = std::clamp(asked[i] + trim_[i], -end, end);
+      }
+      for (std::size_t i = 0; i < 5; ++i) {
+        const double next = trim_[i] + TRIM_RATE[i] * CONTROL_PERIOD * errors[i];
+        trim_[i] = std::clamp(next, -TRIM_MOST[i], TRIM_MOST[i]);
       }
 """,
 }
@@ -52,7 +62,7 @@ def sources(numbers: Mapping[str, Number], policy: Policy) -> dict[str, str]:
             for one in estimates
         ),
         "OBSERVE": "\n".join(_observed(policy)),
-        **(_TRIM if policy.trim.rate else dict.fromkeys(_TRIM, "")),
+        **(_TRIM if policy.trim else dict.fromkeys(_TRIM, "") | {"TRIM_SEEN": "sensors"}),
     }
     found = {}
     for name in ("controller.hpp", "main.cpp"):

@@ -94,13 +94,13 @@ def numbers(policy: Policy, member: LeggedRobot) -> dict[str, Number]:
 def _trim(policy: Policy) -> dict[str, Number]:
     """Numbers of the trim of a policy that has one."""
     trim = policy.trim
-    if not trim.rate:
+    if not trim:
         return {}
-    unit = "m/s, m/s, rad/s"
+    added = "what is added to the command, and to gravity ahead and to the left"
     return {
-        "trim_rate": Number(trim.rate, "1/s", "rate at which errors of the velocity add up"),
-        "trim_most": Number(trim.most, unit, "largest shift of the command by them, either way"),
-        "trim_ends": Number(trim.ends, unit, "largest command with the shift, either way"),
+        "trim_rate": Number(trim.rate, "1/s, 1/s, 1/s, 1/m, 1/m", f"rates of {added}"),
+        "trim_most": Number(trim.most, "m/s, m/s, rad/s, 1, 1", f"largest size of {added}"),
+        "trim_ends": Number(trim.ends, "m/s, m/s, rad/s", "largest command that it leads to"),
     }
 
 

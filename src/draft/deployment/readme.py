@@ -193,9 +193,10 @@ drives."""
 def _shifting(numbers: Mapping[str, Number]) -> Iterator[str]:
     yield "## Trim"
     yield (
-        "This policy was not trained with this robot. The error of its velocity adds up and shifts "
-        "the command that it observes, so that a constant drift ends; `start` forgets the shift. A "
-        "robot that is held, or a wrong estimate of its velocity, shifts it to its bounds."
+        "This policy was not trained with this robot. The errors of its velocity add up and change "
+        "the command or the gravity that it observes, so that a constant drift ends; `start` "
+        "forgets them. A robot that is held, or a wrong estimate of its velocity, drives them to "
+        "their bounds."
     )
     yield "\n".join(_table(numbers, _TRIM))
 

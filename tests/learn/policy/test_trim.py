@@ -13,12 +13,15 @@ from draft.design.references import open_design
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.policy.onnx_write import of_policy
 from draft.learn.policy.policy import open_policy
-from draft.learn.policy.trim import NONE, Trim
+from draft.learn.policy.reduced import any_legs
+from draft.learn.policy.trim import NONE, START, Trim
 from draft.learn.policy.validity import fit
 from draft.learn.policy.walk import Walk
 
-MOST, ENDS = np.array([0.2, 0.2, 0.15]), np.array([1.0, 0.3, 0.5])
-TRIM = Trim(0.1, MOST, ENDS)
+RATE, MOST = np.array([0.1, 0.1, 0.1, 0.05, 0.05]), np.array([0.2, 0.2, 0.15, 0.1, 0.1])
+ENDS = np.array([1.0, 0.3, 0.5])
+TRIM = Trim(RATE, MOST, ENDS)
+DOWN = np.array([0.0, 0.0, -1.0])
 three = st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3).map(np.array)
 
 
@@ -27,55 +30,96 @@ def test_a_robot_with_a_constant_drift_ends_at_the_command(
     command: np.ndarray, drift: np.ndarray
 ) -> None:
     # Velocity = command + drift, so the shift nears -drift as exp(-rate t).
-    shift, step = np.zeros(3), 0.02
+    trim = Trim(RATE * (1, 1, 1, 0, 0), MOST, ENDS)
+    state, step = START, 0.02
     for _ in range(2000):
-        shift = TRIM.next(shift, command, TRIM.shifted(command, shift) + drift, step)
-    left = drift * (1 - TRIM.rate * step) ** 2000
-    np.testing.assert_allclose(shift, -(drift - left), atol=1e-9)
-    np.testing.assert_allclose(TRIM.shifted(command, shift) + drift, command + left, atol=1e-9)
+        state = trim.next(state, command, trim.command(command, state) + drift, step)
+    left = drift * (1 - RATE[0] * step) ** 2000
+    np.testing.assert_allclose(state[:3], -(drift - left), atol=1e-9)
+    np.testing.assert_allclose(trim.command(command, state) + drift, command + left, atol=1e-9)
+
+
+@given(st.floats(-0.09, 0.09), st.floats(-0.09, 0.09))
+def test_a_robot_that_drifts_to_where_it_leans_ends_upright_in_what_it_feels(
+    ahead: float, left: float
+) -> None:
+    # Velocity = what it feels as leaning back, per unit: gravity ahead is answered by slowing down.
+    trim = Trim(RATE * (0, 0, 0, 1, 1), MOST, ENDS)
+    state, felt = START, np.array([ahead, left])
+    for _ in range(20000):
+        slower = trim.gravity(DOWN, state)[:2]
+        state = trim.next(state, np.zeros(3), [*(felt - slower), 0.0], 0.05)
+    np.testing.assert_allclose(state[3:], felt, atol=1e-9)
+    assert (state[:3] == 0).all()
 
 
 @given(three, three, st.floats(0.0, 100.0))
-def test_a_shift_stays_within_its_bounds_and_those_of_the_training(
+def test_a_state_stays_within_its_bounds_and_the_command_in_those_of_the_training(
     command: np.ndarray, velocity: np.ndarray, time: float
 ) -> None:
-    shift = TRIM.next(np.zeros(3), command, velocity, time)
-    assert (np.abs(shift) <= MOST).all()
-    seen = TRIM.shifted(command, shift)
+    state = TRIM.next(START, command, velocity, time)
+    assert (np.abs(state) <= MOST).all()
+    seen = TRIM.command(command, state)
     assert (np.abs(seen) <= np.maximum(ENDS, np.abs(command))).all()
 
 
-@given(three, three, three)
+@given(three, three)
 def test_without_a_trim_the_policy_sees_what_is_asked(
-    shift: np.ndarray, command: np.ndarray, velocity: np.ndarray
+    command: np.ndarray, velocity: np.ndarray
 ) -> None:
-    assert (NONE.next(np.zeros(3), command, velocity, 1.0) == 0).all()
-    np.testing.assert_array_equal(NONE.shifted(command, np.zeros(3)), command)
+    state = NONE.next(START, command, velocity, 1.0)
+    assert (state == 0).all()
+    assert not NONE
+    np.testing.assert_array_equal(NONE.command(command, state), command)
+    np.testing.assert_array_equal(NONE.gravity(DOWN, state), DOWN)
 
 
 def test_a_trim_of_many_robots_is_that_of_each() -> None:
     drawn = np.random.default_rng(0).normal(size=(3, 5, 3))
+    states = np.random.default_rng(1).normal(size=(5, 5)) / 20
     times = np.linspace(0.1, 0.5, 5)[:, None]
-    whole = TRIM.next(drawn[0], drawn[1], drawn[2], times)
+    whole = TRIM.next(states, drawn[1], drawn[2], times)
+    gravity = TRIM.gravity(drawn[0], states)
     for i in range(5):
-        one = TRIM.next(drawn[0, i], drawn[1, i], drawn[2, i], times[i])
+        one = TRIM.next(states[i], drawn[1, i], drawn[2, i], times[i])
         np.testing.assert_array_equal(whole[i], one)
+        np.testing.assert_array_equal(gravity[i], TRIM.gravity(drawn[0, i], states[i]))
 
 
-def test_a_humanoid_walks_nearer_to_the_command_with_the_trim() -> None:
-    model = open_design("humanoid").build()
+@pytest.mark.parametrize(("robot", "speed"), [("humanoid", 0.3), ("hexapod", 0.2)])
+def test_the_policy_of_all_legs_observes_more_than_it_is_asked(robot: str, speed: float) -> None:
+    model = open_design(robot).build()
     found = fit(model)
-    assert found.policy.trim.rate > 0
-    walk = Walk(model, found, (0.3, 0.0, 0.0))
-    untrimmed = walk.controller.observe(walk.data, walk.command)
+    walk = Walk(model, found, (speed, 0.0, 0.0))
+    command = [-3, -2, -1]
+
+    def trimmed() -> tuple[np.ndarray, np.ndarray]:
+        seen = walk.controller.observe(walk.data, walk.command)
+        return seen[command] - walk.command, seen[6:8] + walk.data.xmat[1].reshape(3, 3)[2, :2]
+
     walk.advance(6.0)
-    seen = walk.controller.observe(walk.data, walk.command)
     assert walk.falls == 0
-    np.testing.assert_allclose(untrimmed[-3:], walk.command, atol=1e-6)
-    assert np.abs(seen[-3:] - walk.command).max() > 0.01  # It has been shifted.
+    of_command, of_gravity = map(np.abs, trimmed())
+    legs = len(legged_robot(model.design, model).feet)
+    assert (of_command.max() > 0.005) == (legs > 2)
+    assert (of_gravity.max() > 0.005) == (legs == 2)
     walk.restart()
-    again = walk.controller.observe(walk.data, walk.command)
-    np.testing.assert_allclose(again[-3:], walk.command, atol=1e-6)
+    assert np.abs(np.concatenate(trimmed())).max() < 1e-6
+
+
+def test_a_trim_has_the_size_of_its_robot() -> None:
+    member = legged_robot(open_design("hexapod"))
+    own, without = fit(open_design("hexapod").build()).policy.trim, any_legs().trim(6)
+    # The same motion in both units, of a robot that misses 0.1 sqrt(g L) for sqrt(L / g).
+    length = member.leg_length
+    speed, rate = np.sqrt(9.81 * length), np.sqrt(9.81 / length)
+    missed = np.array([0.1, -0.05, 0.2])
+    units = np.array([speed, speed, rate])
+    state = own.next(START, missed * units, np.zeros(3), 1 / rate)
+    np.testing.assert_allclose(
+        state, without.next(START, missed, np.zeros(3), 1.0) * [*units, 1, 1], rtol=1e-4
+    )
+    np.testing.assert_allclose(own.ends, without.ends * units, rtol=1e-4)
 
 
 def test_the_file_of_one_robot_keeps_the_trim(tmp_path: Path) -> None:
@@ -87,7 +131,7 @@ def test_the_file_of_one_robot_keeps_the_trim(tmp_path: Path) -> None:
     np.testing.assert_allclose(open_policy(file).trim.numbers(), policy.trim.numbers(), rtol=1e-8)
 
 
-@pytest.mark.parametrize("numbers", [[0.1] * 6, [0.1] * 6 + [-1.0], [float("nan")] * 7])
+@pytest.mark.parametrize("numbers", [[0.1] * 6, [*[0.1] * 12, -1.0], [float("nan")] * 13])
 def test_other_numbers_are_no_trim(numbers: list[float]) -> None:
     with pytest.raises(ValueError, match="trim has"):
         Trim.of(numbers)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from draft.errors import DraftError
 from draft.learn.policy.matching import ANGLES, OF_JOINTS
 from draft.learn.policy.policy import DESIGN, Policy
+from draft.learn.policy.trim import START
 from draft.learn.task.recipes import LAPTOP
 
 _OFFSET = LAPTOP.config.episodes.joints  # Largest offset of a joint at the start [rad].
@@ -62,7 +63,7 @@ class Controller:
         self._decimation = round(policy.control_period / policy.timestep)
         self._action = np.zeros(len(policy.joints))
         self._past: list[Mapping[str, Array]] = []  # Terms of the last steps.
-        self._shift = np.zeros(3)  # Of the command, by the policy's trim.
+        self._trim = START  # State of the policy's trim.
         self._since = 0
         # Rays use a copy in which the robot's own geoms have a group of their own.
         self._sight = copy.copy(model)
@@ -84,7 +85,7 @@ class Controller:
     def resume(self, other: Controller) -> None:
         """Continue where another controller of the same joints stopped."""
         self._action, self._since = other._action.copy(), other._since
-        self._past, self._shift = list(other._past), other._shift.copy()
+        self._past, self._trim = list(other._past), other._trim
 
     def reset(self, data: mujoco.MjData, seed: int = 0) -> None:
         """Put the robot near its home pose, at the model's first keyframe if it has one.
@@ -102,7 +103,7 @@ class Controller:
             mujoco.mj_resetData(self.model, data)
         data.qpos[self._q] = self.policy.home + start_offsets(self.policy, seed)
         self._action, self._past = np.zeros_like(self._action), []
-        self._shift = np.zeros(3)
+        self._trim = START
         self._since = 0
         mujoco.mj_forward(self.model, data)
 
@@ -122,8 +123,8 @@ class Controller:
             steps = [*self._past, parts]
             self._past = steps[max(0, len(steps) + 1 - max(self.policy.history)) :]
             moving = np.append(parts["base_lin_vel"][:2], parts["base_ang_vel"][2])
-            self._shift = self.policy.trim.next(
-                self._shift, command, moving, self.policy.control_period
+            self._trim = self.policy.trim.next(
+                self._trim, command, moving, self.policy.control_period
             )
             if not np.isfinite(self._action).all():
                 cause = "the policy or the simulation gives values that are not finite"
@@ -164,11 +165,11 @@ class Controller:
         parts: dict[str, Array] = {
             "base_lin_vel": linear.copy(),
             "base_ang_vel": angular.copy(),
-            "projected_gravity": -turn[2],
+            "projected_gravity": self.policy.trim.gravity(-turn[2], self._trim),
             ANGLES: (sign * (data.qpos[self._q] - self.policy.home))[~self.policy.rolls],
             "joint_vel": sign * data.qvel[self._v],
             "actions": self._action,
-            "command": self.policy.trim.shifted(command, self._shift),
+            "command": self.policy.trim.command(command, self._trim),
             DESIGN: self.policy.features,
         }
         if len(self.policy.scan_points):

@@ -109,7 +109,7 @@ def of_policy(policy: Policy, member: LeggedRobot, commands: Sequence[float]) ->
         metadata |= policy.structure.texts()
     if policy.rolls.any():
         metadata["joint_rolls"] = policy.rolls.astype(int)
-    if policy.trim.rate:
+    if policy.trim:
         metadata["trim"] = policy.trim.numbers()
     return chain(*policy.network.layers(), {key: text(value) for key, value in metadata.items()})
 

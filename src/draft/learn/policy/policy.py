@@ -87,7 +87,7 @@ class Policy:
         leg_length: thigh plus shank of the design [m].
         action_std: standard deviation of the actions at the end of the training, shape (joints,);
             (0,) for a file that does not state it.
-        trim: what shifts its command [1/s, m/s, rad/s]; of one kind of robot nothing does.
+        trim: integrators of the errors of the velocity; of one kind of robot there are none.
     """
 
     file: Path

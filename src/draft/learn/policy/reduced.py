@@ -44,9 +44,10 @@ _NARROW = 0.1  # Width of a range of features below which it counts as this wide
 LAYOUT = "slots, knees by their bend, centre of mass"
 # Largest divisor of an observation that is constant in the training, with the epsilon of rsl-rl.
 _CONSTANT = 1.01e-2
-# Trim, chosen on generated bodies: rate per sqrt(L / g), and largest shift per sqrt(g L), of wz
-# times sqrt(L / g).
-_RATE, _MOST = 0.1, (0.2, 0.2, 0.15)
+# Trims on two legs and on more, chosen on generated bodies, without units: rates, largest states.
+# On two legs a command that is shifted toward zero lets the policy stand, and fall.
+_BY_LEAN = np.array([0.0, 0.0, 0.0, 0.05, 0.05]), np.array([0.0, 0.0, 0.0, 0.15, 0.15])
+_BY_COMMAND = np.array([0.1, 0.1, 0.1, 0.0, 0.0]), np.array([0.2, 0.2, 0.15, 0.0, 0.0])
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,7 +96,8 @@ class LegsPolicy:
 
     def trim(self, legs: int) -> Trim:
         """Trim of a robot with this number of legs, in units of sqrt(L / g) and sqrt(g L)."""
-        return Trim(_RATE, np.array(_MOST), self._commands(legs))
+        rate, most = _BY_LEAN if legs == 2 else _BY_COMMAND
+        return Trim(rate, most, self._commands(legs))
 
     def _commands(self, legs: int) -> Array:
         least = np.min([*self.commands.values()], axis=0)
@@ -156,7 +158,6 @@ class LegsPolicy:
         )
         peak, most = np.array(member.peak_torque), self.commands_for(member)
         timestep = float(texts["physics_timestep"])
-        trim = self.trim(len(member.feet))
         return Policy(
             file=self.file,
             network=self._network(
@@ -190,11 +191,7 @@ class LegsPolicy:
             known=np.zeros((2, 0)),
             leg_length=member.leg_length,
             action_std=self._noise(slots),
-            trim=Trim(
-                trim.rate * math.sqrt(GRAVITY / member.leg_length),
-                trim.most * _speeds(member),
-                most,
-            ),
+            trim=_sized(self.trim(len(member.feet)), member),
         )
 
     def _noise(self, slots: Slots) -> Array:
@@ -338,6 +335,15 @@ def open_for(path: str | Path, members: Sequence[LeggedRobot]) -> Policy:
         cause = f"{path} becomes the policy of one robot, and this training has {len(members)}"
         raise DraftError(cause, 'train one design, or start with `origin="scratch"`')
     return found.of_robot(members[0])
+
+
+def _sized(trim: Trim, member: LeggedRobot) -> Trim:
+    """A trim without units in those of a robot."""
+    speeds = _speeds(member)
+    states = np.array([*speeds, 1.0, 1.0])
+    errors = np.array([*speeds, *speeds[:2]])
+    rate = trim.rate * states / errors * math.sqrt(GRAVITY / member.leg_length)
+    return Trim(rate, trim.most * states, trim.ends * speeds)
 
 
 def _speeds(member: LeggedRobot) -> Array:
