@@ -47,7 +47,6 @@ _MASSES = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 BEFORE = 5696  # Iterations of the trainings that the policy goes on from.
 # Why robots do not walk, by name, as found by looking at them.
 CAUSES: Mapping[str, str] = {
-    "agibot_x1": "Its description limits no joint, and Draft bends its knees backward.",
     "anymal_d": "It sinks to two thirds of its height, near where a robot counts as fallen.",
     "icub": "Its x axis points backward.",
 }

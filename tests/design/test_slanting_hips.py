@@ -76,3 +76,18 @@ def test_many_designs_crouch_as_each_alone(tmp_path: Path) -> None:
         for name, angle in together.items():
             assert np.broadcast_to(angle, len(slopes))[i] == pytest.approx(alone[name], abs=1e-12)
     assert np.ptp(together["left_hip_roll"]) > 0.05
+
+
+def test_a_knee_whose_range_is_symmetric_moves_toward_the_toes(tmp_path: Path) -> None:
+    """As on robots whose descriptions limit no joint; the axis may point either way."""
+    for axis, sign in (("y", 1), ("[0, -1, 0]", -1)):
+        folder = tmp_path / str(sign)
+        shutil.copytree(BIPED, folder)
+        file = folder / "tree.yaml"
+        text = file.read_text(encoding="utf-8")
+        old = "knee, axis: y, range: [0, 2.5]"
+        assert old in text
+        file.write_text(text.replace(old, f"knee, axis: {axis}, range: [-3, 3]"), encoding="utf-8")
+        angles = crouch(draft.load(folder).resolve())
+        assert sign * angles["left_knee"] > 0.5
+        assert sign * angles["right_knee"] > 0.5

@@ -7,7 +7,8 @@ the ankle is below it; without one it is the nearest that is less than 60 degree
 humanoids with slanting hips, and the other two hinges above the knee take back what it turns aside.
 The ankle, the next parallel hinge below the knee, makes the foot level again; without one the foot
 is the ankle. Of the two bending directions the knee takes the one closer to the middle of its
-range. Joint ranges are not checked otherwise.
+range; if that is straight and the foot a plate, the knee moves toward the toes. Joint ranges are
+not checked otherwise.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from collections.abc import Mapping
 from draft import geometry as g
 from draft.design.design import Body, Design
 from draft.geometry import Frame, Rotation, Vector
+from draft.spec.primitives.foot import PlatePart
 from draft.values import (
     Mask,
     Value,
@@ -42,6 +44,7 @@ CROUCH = 0.878
 PARALLEL = 0.95
 SLANTING = 0.5  # |cosine| for a hip without a parallel axis: 60 degrees.
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_SYMMETRIC = 1e-3  # Middle of a knee's range that tells nothing of how it bends [rad].
 _STEPS, _FLAT = 5, 0.1  # Newton's steps, and the volume of three axes below which none is taken.
 
 
@@ -79,6 +82,9 @@ class Crouch:
         low, high = joint.range if joint else (0.0, 0.0)
         middle = (low + high) / 2
         side = where(abs(bend - zero - middle) <= abs(bend + zero + middle), 1.0, -1.0)
+        toes = g.dot(_toes(design.bodies[run[-1]], frames[run[-1]]), forth)
+        unknown = both(abs(middle) < _SYMMETRIC, abs(toes) > 0.0)
+        side = where(unknown, where(toes < 0, 1.0, -1.0), side)
         turn = side * bend - zero
         lean = -1.0 * atan2(uy, ux) - atan2(side * b * sin(bend), a + b * cos(bend))
         ends = (side * (low + zero), side * (high + zero))
@@ -100,6 +106,14 @@ class Crouch:
                 self.angles[k] = where(slants, angle, before)
         for k, share in self.ankle.items():
             self.angles[k] = -1.0 * share * turned
+
+
+def _toes(body: Body, frame: Frame) -> Vector:
+    """How far a plate reaches beyond its middle [m]; zero for other feet."""
+    end = body.link.end
+    if not isinstance(end, PlatePart):
+        return g.ZERO
+    return g.rotate(frame[1], (end.offset, 0.0, 0.0))
 
 
 def bend_at(span: Value, a: Value, b: Value) -> Value:
