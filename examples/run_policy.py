@@ -34,7 +34,7 @@ while data.time < 10.0:
     observation = (
         linear,  # [m/s], in the trunk's frame
         angular,  # [rad/s]
-        policy.trim.gravity(-data.xmat[1][6:], trim),  # direction in the trunk's frame
+        policy.trim.gravity(-data.xmat[1][6:], trim),  # in the trunk's frame
         data.qpos[7:] - policy.home,  # [rad]
         data.qvel[6:],  # [rad/s]
         action,  # the last one
