@@ -64,7 +64,7 @@ booster lie inside and fall all the same, as many drawn bodies with slanting hip
 INTRODUCTION = """\
 Draft ships one policy for robots of any legs: two, four or six of them, with three to six driven
 joints each. The shipped hexapod, biped and humanoid walk with it; of real robots, nine of ten
-quadrupeds stay up at half a sqrt(g L), and two fifths of the bipeds and humanoids at a quarter. It
+quadrupeds stay up at half a sqrt(g L), and nearly half of the bipeds and humanoids at a quarter. It
 observes and moves joints by their place, which is the side, the order from the front and the role
 in the leg, and is told torques, speeds, inertias, lengths and the centre of mass of the body, all
 without units. For one robot that is an ordinary small network of its own joints, which NumPy runs
