@@ -125,6 +125,7 @@ def rolled_out(
     seconds: float = SECONDS,
     seed: int = 0,
     threads: int = 1,
+    velocity_noise: float | None = None,
 ) -> Rolled:
     """Roll out robots of one topology side by side, natively.
 
@@ -136,6 +137,7 @@ def rolled_out(
         seconds: duration of a roll-out [s].
         seed: seed of starts, noise and pushes.
         threads: threads of MuJoCo.
+        velocity_noise: largest error of the observed velocity [m/s]; None for that of the training.
 
     Raises:
         DraftError: the policy does not drive a robot.
@@ -153,7 +155,10 @@ def rolled_out(
     torch.set_num_threads(1)
     plan = source.plan
     of_plan = {"see_design": plan.see_design, "see_ground": plan.see_ground, "seed": seed}
-    task = Task(tuple(members), plan.stage, plan.config, "flat", **of_plan)
+    config = plan.config
+    if velocity_noise is not None:
+        config = config.with_values({"observations.linear_velocity_noise": velocity_noise})
+    task = Task(tuple(members), plan.stage, config, "flat", **of_plan)
     settle = seconds * SETTLE / SECONDS
     trial = Trial(task, (), replicas * len(members), seconds, settle, seed=seed)
     sizes = np.array([_sizes(member) for member in members])  # (robots, 3)

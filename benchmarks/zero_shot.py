@@ -87,12 +87,14 @@ class Job:
         entry: the robot.
         replicas: roll-outs at each case.
         seconds: duration of a roll-out [s].
+        velocity_noise: largest error of the observed velocity [m/s]; None for that of the training.
     """
 
     legs: LegsPolicy
     entry: Entry
     replicas: int
     seconds: float
+    velocity_noise: float | None = None
 
 
 def main(
@@ -101,6 +103,7 @@ def main(
     replicas: int = REPLICAS,
     seconds: float = SECONDS,
     only: tuple[str, ...] = (),
+    velocity_noise: float | None = None,
     out: Path | None = None,
 ) -> None:
     """Roll out and print.
@@ -111,6 +114,8 @@ def main(
         replicas: roll-outs at each command and with pushes.
         seconds: duration of a roll-out [s].
         only: names of robots; all by default.
+        velocity_noise: largest error of the observed velocity [m/s]; by default that of the
+            training.
         out: JSON file for the numbers.
     """
     legs = open_legs_policy(policy)
@@ -120,7 +125,7 @@ def main(
     chosen = [entry for entry in entries(robots) if not only or entry.key in only]
     if not chosen:
         raise DraftError(f"{robots} has no robot {' or '.join(only)}", "name others with --only")
-    jobs = [Job(legs, entry, replicas, seconds) for entry in chosen]
+    jobs = [Job(legs, entry, replicas, seconds, velocity_noise) for entry in chosen]
     rows: dict[str, dict[str, Any]] = {}
     for job, row in parallel.run(jobs, measured, min(cores(), len(jobs))):
         rows[job.entry.key] = row
@@ -201,7 +206,8 @@ def measured(job: Job) -> dict[str, Any]:
 def _walked(job: Job, source: Source, member: LeggedRobot) -> dict[str, Any]:
     """What a robot does with a policy, and the joint nearest its limit."""
     cases = cases_of(len(member.feet))
-    found = rolled_out(source, [member], cases, replicas=job.replicas, seconds=job.seconds)
+    options = {"replicas": job.replicas, "seconds": job.seconds}
+    found = rolled_out(source, [member], cases, **options, velocity_noise=job.velocity_noise)
     fastest = max((i for i in range(4) if found.up(i) >= 0.5), default=None)
     limit = None if fastest is None else found.limit(fastest)
     if limit is not None and fastest is not None:

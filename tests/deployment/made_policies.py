@@ -62,6 +62,7 @@ def policy_file(
         timestep=0.005,
         contact_time=(0.01, 0.01),
         delay=(0.0, delay),
+        velocity_noise=0.5,
         terms=tuple((name, lengths[name]) for name in terms),
         history=tuple(frames.values()),
         scan_points=np.zeros((0, 2)),

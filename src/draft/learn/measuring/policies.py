@@ -238,6 +238,7 @@ def config_of(policy: Policy) -> Config:
         "actuation.action_scale": float(np.median(policy.action_scale[turned])),
         "actuation.stiffness": float(np.median((policy.stiffness / policy.peak_torque)[turned])),
         "actuation.damping": float(np.median(policy.damping / policy.peak_torque)),
+        "observations.linear_velocity_noise": policy.velocity_noise,
     }
     if policy.rolls.any():
         shares = (policy.action_scale / policy.no_load_speed)[policy.rolls]

@@ -89,6 +89,7 @@ def of_policy(policy: Policy, member: LeggedRobot, commands: Sequence[float]) ->
         "physics_timestep": policy.timestep,
         "contact_time": policy.contact_time,
         "delay": policy.delay,
+        "velocity_noise": policy.velocity_noise,
         "observation_names": names,
         "observation_terms_dim": lengths,
         "observation_terms_scale": [1.0] * len(names),

@@ -6,6 +6,7 @@ others from a run of `draft train` with `draft play`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from draft.learn.policy.matching import Structure, rolls_of_texts
 from draft.learn.policy.onnx_file import Network, read
 from draft.learn.policy.trim import NONE, Trim
 from draft.learn.task.constants import CONTACT_TIME
+from draft.learn.task.groups import Observations
 from draft.learn.task.scan import scan_points
 
 # Skills that studies compare, and the stages of training that teach them.
@@ -72,6 +74,7 @@ class Policy:
         timestep: physics step of the training [s].
         contact_time: least and greatest time constant of the feet's contacts in training [s].
         delay: least and greatest delay of the joint targets in training [s].
+        velocity_noise: largest error of the observed velocity in training [m/s].
         terms: names and lengths of the terms of an observation, in order.
         history: for each term, the number of its last values that are observed, the oldest first
             and the present one last.
@@ -111,6 +114,7 @@ class Policy:
     timestep: float
     contact_time: tuple[float, float]
     delay: tuple[float, float]
+    velocity_noise: float
     terms: tuple[tuple[str, int], ...]
     history: tuple[int, ...]
     scan_points: Array
@@ -264,6 +268,15 @@ def with_network(file: Path, network: Network) -> Policy:
         raise DraftError(cause, "write it with 'draft play'") from None
 
 
+def velocity_noise(texts: Mapping[str, str]) -> float:
+    """Largest error of the observed velocity in training [m/s]: the usual one if none is stated.
+
+    Args:
+        texts: metadata of a file.
+    """
+    return float(texts.get("velocity_noise", Observations.linear_velocity_noise))
+
+
 def _policy(file: Path, network: Network) -> Policy:
     texts = network.metadata
 
@@ -304,6 +317,7 @@ def _policy(file: Path, network: Network) -> Policy:
         timestep=float(texts["physics_timestep"]),
         contact_time=ends("contact_time", CONTACT_TIME),
         delay=ends("delay", 0.0),
+        velocity_noise=velocity_noise(texts),
         terms=tuple(zip(names, lengths, strict=True)),
         history=tuple(max(1, int(n)) for n in texts[_HISTORY].split(","))
         if _HISTORY in texts

@@ -33,7 +33,7 @@ from draft.learn.bodies.slots import (
 )
 from draft.learn.policy.matching import structure_of
 from draft.learn.policy.onnx_file import Network, of_layers, read
-from draft.learn.policy.policy import ANY, Policy, with_network
+from draft.learn.policy.policy import ANY, Policy, velocity_noise, with_network
 from draft.learn.policy.region import SAME, Departure
 from draft.learn.policy.trim import Trim
 from draft.values import Array
@@ -182,6 +182,7 @@ class LegsPolicy:
             timestep=timestep,
             contact_time=_ends(texts["contact_time"]),
             delay=_ends(texts["delay"]),
+            velocity_noise=velocity_noise(texts),
             terms=terms,
             history=(1,) * len(terms),
             scan_points=np.zeros((0, 2)),

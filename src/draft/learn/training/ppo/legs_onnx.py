@@ -86,6 +86,7 @@ def _metadata(run: Run, iteration: int) -> dict[str, str]:
         "physics_timestep": f"{step:.9g}",
         "contact_time": _row(config.episodes.contact_time),
         "delay": _row(config.episodes.delay),
+        "velocity_noise": f"{config.observations.linear_velocity_noise:.9g}",
         "action_scale": f"{config.actuation.action_scale:.9g}",
         "stiffness": f"{config.actuation.stiffness:.9g}",
         "damping": f"{config.actuation.damping:.9g}",

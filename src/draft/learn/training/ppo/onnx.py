@@ -83,6 +83,7 @@ def metadata(player: Loaded, run: Run) -> dict[str, str]:
         "physics_timestep": env.physics_dt,
         "contact_time": list(plan.config.episodes.contact_time),
         "delay": list(plan.config.episodes.delay),
+        "velocity_noise": plan.config.observations.linear_velocity_noise,
         "observation_terms_dim": _dims(env),
         "command_ranges": [[-most, most] for most in largest],
         "height_scan_size": list(numbers.scan_size),
