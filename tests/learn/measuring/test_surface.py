@@ -32,7 +32,7 @@ from draft.learn.measuring.surface_page import page  # noqa: E402
 from draft.learn.measuring.utilisation import Histograms  # noqa: E402
 from draft.learn.policy.policy import ANY, FAMILY, open_policy, policy  # noqa: E402
 from draft.learn.policy.validity import ANY_NAME, FAMILY_NAME  # noqa: E402
-from draft.learn.task.recipes import LAPTOP  # noqa: E402
+from draft.learn.task.recipes import LAPTOP, RECIPES  # noqa: E402
 from draft.learn.training.run import Plan, Run  # noqa: E402
 from draft.model.model import preview  # noqa: E402
 from tests.learn.measuring.columns import worlds  # noqa: E402
@@ -274,9 +274,12 @@ def test_an_exported_policy_is_measured_with_its_own_physics_and_servos() -> Non
     shipped = open_policy(FAMILY)
     own = {"episodes.contact_time": (0.01, 0.01), "episodes.delay": (0.0, 0.015)}
     assert _of_file(shipped, "shipped").plan.config == LAPTOP.config.with_values(own)
-    other = replace(shipped, timestep=0.001, action_scale=2 * shipped.action_scale)
+    other = replace(
+        shipped, timestep=0.001, action_scale=2 * shipped.action_scale, velocity_noise=0.1
+    )
     config = _of_file(other, "other").plan.config
     assert (config.physics.timestep, config.physics.decimation) == (0.001, 20)
+    assert config.observations.linear_velocity_noise == 0.1
     usual = LAPTOP.config.actuation
     assert config.actuation == replace(usual, action_scale=2 * usual.action_scale)
 
@@ -293,6 +296,8 @@ def test_the_policy_of_all_legs_is_opened_for_robots_that_the_family_does_not_dr
     assert source.name == ANY_NAME
     source.drive.check(humanoid)
     assert source.warning(humanoid) == ""
+    noise = source.plan.config.observations.linear_velocity_noise
+    assert noise == RECIPES["any"].config.observations.linear_velocity_noise
     strong = replace(humanoid, peak_torque=tuple(9 * x for x in humanoid.peak_torque))
     assert "outside the region of the policy of any legs: peak torque" in source.warning(strong)
     with pytest.raises(DraftError, match="name a robot"):
