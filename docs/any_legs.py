@@ -64,7 +64,7 @@ booster lie inside and fall all the same, as many drawn bodies with slanting hip
 INTRODUCTION = """\
 Draft ships one policy for robots of any legs: two, four or six of them, with three to six driven
 joints each. The shipped hexapod, biped and humanoid walk with it; of real robots, nine of ten
-quadrupeds stay up at half a sqrt(g L), and nearly half of the bipeds and humanoids at a quarter. It
+quadrupeds stay up at half a sqrt(g L), and three of five bipeds and humanoids at a quarter. It
 observes and moves joints by their place, which is the side, the order from the front and the role
 in the leg, and is told torques, speeds, inertias, lengths and the centre of mass of the body, all
 without units. For one robot that is an ordinary small network of its own joints, which NumPy runs
@@ -79,7 +79,8 @@ region of validity, it takes the nearest numbers that it knows, says so and trie
 
 In this page velocities are per sqrt(g L) and rates of turn per sqrt(g / L), with the leg length L.
 Roll-outs last {seconds:g} s from noisy starts, with the delays and the noise of the training: the
-velocity that the policy observes errs by up to 0.1 m/s. An error is the mean distance of the
+velocity that the policy observes errs by up to 0.1 m/s. With 0.5 m/s (`--velocity-noise 0.5`) 84 %
+of the real quadrupeds walk too, and 29 % of the bipeds and humanoids. An error is the mean distance of the
 trunk's velocity from the command, over time and over the roll-outs that stay up. Pushes change the
 velocity by up to {push:g} sqrt(g L) along x and along y, three times."""
 TRIM = """\
