@@ -89,7 +89,10 @@ training, which does not hold on hard ground. To learn on for 150 iterations wit
 gains little (below); makers' controllers had more time and other rewards. The climbing policy has
 learnt from 25 million steps and climbs a quarter of the leg length, where papers jump; it stops
 before higher steps rather than falls, and was still learning. A policy of a machine's own:
-`draft twin FILE --capabilities --train DIR`."""
+`draft twin FILE --capabilities --train DIR`.
+
+The policy of all legs is asked at most 0.7 sqrt(g L) on two legs, a walk: what it does is no
+prediction of how fast these machines run. It walks with bent knees, which takes power."""
 COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
 OWNED = ("top_speed", "kick", "walking_power")
 LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.
@@ -300,6 +303,15 @@ def _published(found: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def _score(found: Sequence[dict[str, Any]]) -> list[str]:
+    """How often the rule holds, of robots that the policy of all legs drives apart."""
+    others = _by(ANY_NAME, found)
+    lines = _held([one for one in found if one["policy"] != ANY_NAME])
+    if others:
+        lines += ["", "Of the robots that the policy of all legs drives:", "", *_held(others)]
+    return lines
+
+
+def _held(found: Sequence[dict[str, Any]]) -> list[str]:
     items = [(one, item) for one in found for item in one["published"]]
     limits = [item["verdict"] for _, item in items if item["verdict"] in ("right", "below")]
     powers = [item["verdict"] for _, item in items if item["verdict"] in ("within", "outside")]
