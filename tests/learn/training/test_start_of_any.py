@@ -154,6 +154,12 @@ def other_layout(model: Any) -> None:
             entry.value = "tokens"
 
 
+def negative_noise(model: Any) -> None:
+    onnx.helper.set_model_props(
+        model, {one.key: one.value for one in model.metadata_props} | {"velocity_noise": "-0.1"}
+    )
+
+
 def other_slots(model: Any) -> None:
     for tensor in model.graph.initializer:
         if tensor.name in ("weight2", "bias2"):
@@ -167,6 +173,7 @@ def other_slots(model: Any) -> None:
         (not_finite, "its numbers are not finite"),
         (other_layout, "its layout is 'tokens'"),
         (other_slots, "it has not 36 outputs"),
+        (negative_noise, "velocity_noise is -0.1, and no number that is 0 or more"),
     ],
 )
 def test_another_file_is_refused(

@@ -6,6 +6,7 @@ others from a run of `draft train` with `draft play`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -273,8 +274,14 @@ def velocity_noise(texts: Mapping[str, str]) -> float:
 
     Args:
         texts: metadata of a file.
+
+    Raises:
+        ValueError: it is no number that is 0 or more.
     """
-    return float(texts.get("velocity_noise", Observations.linear_velocity_noise))
+    found = float(texts.get("velocity_noise", Observations.linear_velocity_noise))
+    if not 0.0 <= found < math.inf:
+        raise ValueError(f"velocity_noise is {found}, and no number that is 0 or more")
+    return found
 
 
 def _policy(file: Path, network: Network) -> Policy:

@@ -287,6 +287,7 @@ def _legs(file: Path, network: Network) -> LegsPolicy:
     try:
         if texts["layout"] != LAYOUT:
             raise ValueError(f"its layout is '{texts['layout']}', and '{LAYOUT}' is known")
+        velocity_noise(texts)  # Which may be wrong.
         rows = (row.split(";") for row in texts["commands"].split(","))
         commands = {int(legs): (float(x), float(y), float(z)) for legs, x, y, z in rows}
         known = {

@@ -2,9 +2,9 @@
 
 A policy that has never seen a robot follows its commands with a constant error, such as a drift
 ahead of a robot whose mass lies further ahead. Integral action removes constant errors (Astrom and
-Murray, Feedback Systems, section 11.1). One kind shifts the command. The other lets the policy see
-a trunk that leans further to where the robot drifts, so that it leans back; the slow steps of a
-robot on two legs are those of its training then. Both are slow compared with a step, and bounded.
+Murray, Feedback Systems, 2nd edition, section 11.1). One kind shifts the command. The other lets
+the policy see a trunk that leans further to where the robot drifts, so that it leans back, and its
+command stays as asked. Both are slow compared with a step, and bounded.
 """
 
 from __future__ import annotations
