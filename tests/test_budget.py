@@ -27,7 +27,7 @@ BUDGET = {
     "fitting": 3_890,
     "imports": 6_450,
     "laws": 2_090,  # The nearest module of the catalogue.
-    "learn": 20_850,  # A trim of what the policy of all legs observes.
+    "learn": 20_915,  # A trim of what the policy of all legs observes.
     "metrics": 3_200,
     "model": 5_655,  # USD; configurations for mjlab and Isaac Lab; parts in every format.
     "reporting": 1_610,  # Tables of parts and of masses by origin.

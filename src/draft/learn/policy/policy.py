@@ -18,8 +18,7 @@ from draft.errors import DraftError, suggest
 from draft.learn.policy.matching import Structure, rolls_of_texts
 from draft.learn.policy.onnx_file import Network, read
 from draft.learn.policy.trim import NONE, Trim
-from draft.learn.task.constants import CONTACT_TIME
-from draft.learn.task.groups import Observations
+from draft.learn.task.constants import CONTACT_TIME, VELOCITY_NOISE
 from draft.learn.task.scan import scan_points
 
 # Skills that studies compare, and the stages of training that teach them.
@@ -278,7 +277,7 @@ def velocity_noise(texts: Mapping[str, str]) -> float:
     Raises:
         ValueError: it is no number that is 0 or more.
     """
-    found = float(texts.get("velocity_noise", Observations.linear_velocity_noise))
+    found = float(texts.get("velocity_noise", VELOCITY_NOISE))
     if not 0.0 <= found < math.inf:
         raise ValueError(f"velocity_noise is {found}, and no number that is 0 or more")
     return found

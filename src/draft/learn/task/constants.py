@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 CONTACT_TIME = 0.02  # MuJoCo's default time constant of contacts [s].
+VELOCITY_NOISE = 0.5  # Largest error of the observed velocity, as of mjlab [m/s].
 
 
 class Scaled(NamedTuple):

@@ -19,6 +19,7 @@ from draft.learn.task.constants import (
     POSITIVE_RANGE,
     RANGE,
     SHARE,
+    VELOCITY_NOISE,
     choice,
     paper,
 )
@@ -90,7 +91,7 @@ class Observations:
     biased_encoders: bool = choice(
         False, "1", "observed joint positions have the bias of their encoders", DRAFT
     )
-    linear_velocity_noise: float = choice(0.5, "m/s", "noise of the velocimeter", MJLAB)
+    linear_velocity_noise: float = choice(VELOCITY_NOISE, "m/s", "noise of the velocimeter", MJLAB)
     angular_velocity_noise: float = choice(0.2, "rad/s", "noise of the gyro", MJLAB)
     gravity_noise: float = choice(0.05, "1", "noise of the projected gravity", MJLAB)
     joint_position_noise: float = choice(0.01, "rad", "noise of the joint positions", MJLAB)

@@ -12,16 +12,13 @@ from tensordict import TensorDict
 from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.padding import MOST, places, size, starts, units
 from draft.learn.bodies.slots import FEATURES, SLOTS, describe
+from draft.learn.measuring.rollout.trimmed import Trimmed
 from draft.learn.policy.reduced import LegsPolicy
-from draft.learn.policy.trim import START
 from draft.learn.task.world.access import robot_of
 
 Policy = Callable[[TensorDict], torch.Tensor]
 _GROUP = "actor"
 _FIRST = starts(_GROUP)
-_ASKED = [_FIRST["command"] + i for i in range(3)]
-_DOWN = [_FIRST["projected_gravity"] + i for i in range(3)]
-_MOVING = [_FIRST["base_lin_vel"], _FIRST["base_lin_vel"] + 1, _FIRST["base_ang_vel"] + 2]
 
 
 def by_slots(policy: LegsPolicy, device: str) -> Callable[[ManagerBasedRlEnv], Policy]:
@@ -62,17 +59,12 @@ def by_slots(policy: LegsPolicy, device: str) -> Callable[[ManagerBasedRlEnv], P
         trim = policy.trim(len(robot.cfg.members[0].feet))
         lengths = np.array([member.leg_length for member in robot.cfg.members])[worlds]
         period = env.step_dt / np.sqrt(lengths / GRAVITY)[:, None]
-        state = np.tile(START, (len(worlds), 1))
+        trimmed = Trimmed(trim, env, _FIRST, period)
 
         def act(seen: TensorDict) -> torch.Tensor:
             padded = constant.copy()
             np.add.at(padded, (rows, entry), seen[_GROUP].cpu().numpy() * factor)
-            padded = padded[:, :unused].clip(-MOST, MOST)
-            state[env.episode_length_buf.cpu().numpy() == 0] = START
-            asked, moving = padded[:, _ASKED], padded[:, _MOVING]
-            padded[:, _ASKED] = trim.command(asked, state)
-            padded[:, _DOWN] = trim.gravity(padded[:, _DOWN], state)
-            state[:] = trim.next(state, asked, moving, period)
+            padded = trimmed(padded[:, :unused].clip(-MOST, MOST))
             wide = policy.network(padded.astype(np.float32))
             still = np.append(wide, np.zeros((len(wide), 1), wide.dtype), axis=1)
             return torch.from_numpy((still[rows, slot] * sign).astype(np.float32)).to(device)

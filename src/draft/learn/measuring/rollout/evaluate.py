@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
+import numpy as np
 import torch
 from mjlab.envs import ManagerBasedRlEnv
 from rsl_rl.models import MLPModel
@@ -20,6 +21,7 @@ from draft.learn.measuring.rollout.common_draws import CommonDraws
 from draft.learn.measuring.rollout.measure import Measures, each_step
 from draft.learn.measuring.rollout.trial import Trial, layout
 from draft.learn.measuring.rollout.trial_env import build
+from draft.learn.measuring.rollout.trimmed import Trimmed
 from draft.learn.measuring.scalars import Worlds
 from draft.learn.measuring.utilisation import Histograms
 from draft.learn.policy.policy import Policy as NumpyPolicy
@@ -109,8 +111,16 @@ def exported(policy: NumpyPolicy, device: str) -> Callable[[ManagerBasedRlEnv], 
             cause = f"{policy.file} observes {', '.join(expected)}, not {', '.join(names)}"
             raise DraftError(cause, "use the folder of its run")
 
+        ends = np.cumsum([0, *(length for _, length in policy.terms)])
+        first = dict(zip(expected, ends.tolist(), strict=False))
+        period = np.full((env.num_envs, 1), policy.control_period)
+        trimmed = Trimmed(policy.trim, env, first, period) if policy.trim else None
+
         def act(seen: TensorDict) -> torch.Tensor:
-            return torch.from_numpy(policy(seen["actor"].cpu().numpy())).to(device)
+            values = seen["actor"].cpu().numpy()
+            if trimmed is not None:
+                values = trimmed(values)
+            return torch.from_numpy(policy(values)).to(device)
 
         return act
 
