@@ -95,6 +95,7 @@ The policy of all legs is asked at most 0.7 sqrt(g L) on two legs, a walk: what 
 prediction of how fast these machines run. It walks with bent knees, which takes power."""
 COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
 OWNED = ("top_speed", "kick", "walking_power")
+_NEAR = 0.05  # Logarithm of the ratio of speeds whose labels would overlap.
 LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.
 
 
@@ -211,12 +212,22 @@ def speeds(found: Sequence[dict[str, Any]]) -> None:
         own, theirs = one["predicted"]["top_speed"], item["value"]
         low, high = own["value"] - own["low"], own["high"] - own["value"]
         color = "#1f5fa8" if item["physical"] else "#b0b0b0"
-        axes.errorbar(theirs, own["value"], [[low], [high]], fmt="o", color=color, ms=5, lw=1)
+        look = {"color": color, "ms": 5, "lw": 1}
+        if one["policy"] == ANY_NAME:
+            look["mfc"] = "white"
+        axes.errorbar(theirs, own["value"], [[low], [high]], fmt="o", **look)
+        # Beside a near one further right there is room on the left alone.
+        crowded = any(
+            theirs < other["value"] < 1.2 * theirs
+            and abs(math.log(its["predicted"]["top_speed"]["value"] / own["value"])) < _NEAR
+            for its, other in points
+        )
         axes.annotate(
             one["robot"].removeprefix("unitree_").removeprefix("deeprobotics_"),
             (theirs, own["value"]),
-            (5, 3),
+            (-5, 3) if crowded else (5, 3),
             textcoords="offset points",
+            ha="right" if crowded else "left",
             fontsize=8,
             color=color,
         )
@@ -255,7 +266,8 @@ def page(found: Sequence[dict[str, Any]]) -> str:
             *_own(found),
             "![Predicted over published top speed](images/real_robots/speeds.png)",
             "",
-            "Blue: claims on the machine. Grey: below sqrt(g L), claims on a product.",
+            "Blue: claims on the machine. Grey: below sqrt(g L), claims on a product. Rings: robots",
+            "that the policy of all legs drives.",
             "",
             "## The maker's masses and predicted ones",
             "",
