@@ -26,7 +26,7 @@ def test_worlds_are_trimmed_apart_and_start_anew_when_they_are_reset() -> None:
     random = np.random.default_rng(0)
     for step in range(6):
         env.episode_length_buf = torch.tensor([step, step % 4])  # The second is reset after 4.
-        seen = random.normal(size=(2, 12)).astype(np.float32)
+        seen: Any = random.normal(size=(2, 12)).astype(np.float32)
         found = trimmed(seen)
         for world in range(2):
             state = START if env.episode_length_buf[world] == 0 else states[world]
