@@ -315,7 +315,7 @@ def _published(found: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def _score(found: Sequence[dict[str, Any]]) -> list[str]:
-    """How often the rule holds, of robots that the policy of all legs drives apart."""
+    """How often the rule holds; robots that the policy of all legs drives have their own lines."""
     others = _by(ANY_NAME, found)
     lines = _held([one for one in found if one["policy"] != ANY_NAME])
     if others:
