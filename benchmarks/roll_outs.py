@@ -23,13 +23,12 @@ from rich.table import Table
 from benchmarks.rows import measured
 from draft.errors import DraftError
 from draft.files import write
-from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.bodies.slots import describe
 from draft.learn.engine.machine import NATIVE
 from draft.learn.measuring.policies import Source
 from draft.learn.measuring.utilisation import QUANTITIES, limiting, percentile
-from draft.learn.policy.reduced import LegsPolicy
+from draft.learn.policy.reduced import LegsPolicy, speed_units
 from draft.learn.silence import quiet
 from draft.learn.training.run import file_digest
 from draft.values import Array, brief
@@ -161,7 +160,7 @@ def rolled_out(
     task = Task(tuple(members), plan.stage, config, "flat", **of_plan)
     settle = seconds * SETTLE / SECONDS
     trial = Trial(task, (), replicas * len(members), seconds, settle, seed=seed)
-    sizes = np.array([_sizes(member) for member in members])  # (robots, 3)
+    sizes = np.array([speed_units(member) for member in members])  # (robots, 3)
     wanted = np.array([case.command for case in cases])[:, None, None, :] * sizes
     worlds = (len(cases), replicas, len(members))
     commands = np.broadcast_to(wanted, (*worlds, 3)).reshape(-1, 3).copy()
@@ -199,12 +198,6 @@ def rolled_out(
         for k in range(len(members))
     )
     return Rolled(tuple(cases), fell, velocity, error, shares)
-
-
-def _sizes(member: LeggedRobot) -> tuple[float, float, float]:
-    """Units of vx, vy [m/s] and wz [rad/s] of a robot."""
-    root = math.sqrt(GRAVITY * member.leg_length)
-    return root, root, math.sqrt(GRAVITY / member.leg_length)
 
 
 def _layout(

@@ -92,7 +92,7 @@ class LegsPolicy:
 
     def commands_for(self, member: LeggedRobot) -> Array:
         """Largest |vx|, |vy| [m/s] and |wz| [rad/s] that were commanded, at the size of a robot."""
-        return self._commands(len(member.feet)) * _speeds(member)
+        return self._commands(len(member.feet)) * speed_units(member)
 
     def trim(self, legs: int) -> Trim:
         """Trim of a robot with this number of legs, in units of sqrt(L / g) and sqrt(g L)."""
@@ -341,14 +341,14 @@ def open_for(path: str | Path, members: Sequence[LeggedRobot]) -> Policy:
 
 def _sized(trim: Trim, member: LeggedRobot) -> Trim:
     """A trim without units in those of a robot."""
-    speeds = _speeds(member)
+    speeds = speed_units(member)
     states = np.array([*speeds, 1.0, 1.0])
     errors = np.array([*speeds, *speeds[:2]])
     rate = trim.rate * states / errors * math.sqrt(GRAVITY / member.leg_length)
     return Trim(rate, trim.most * states, trim.ends * speeds)
 
 
-def _speeds(member: LeggedRobot) -> Array:
+def speed_units(member: LeggedRobot) -> Array:
     """Units of vx, vy [m/s] and wz [rad/s] of a robot, shape (3,)."""
     rate = math.sqrt(GRAVITY / member.leg_length)
     speed = rate * member.leg_length
