@@ -25,11 +25,12 @@ DOWN = np.array([0.0, 0.0, -1.0])
 three = st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3).map(np.array)
 
 
-@given(three.map(lambda x: x / 11), three.map(lambda x: x / 15))
+@given(three.map(lambda x: x / 14), three.map(lambda x: x / 15))
 def test_a_robot_with_a_constant_drift_ends_at_the_command(
     command: np.ndarray, drift: np.ndarray
 ) -> None:
     # Velocity = command + drift, so the shift nears -drift as exp(-rate t).
+    assert (np.abs(command - drift) <= ENDS).all()
     trim = Trim(RATE * (1, 1, 1, 0, 0), MOST, ENDS)
     state, step = START, 0.02
     for _ in range(2000):
@@ -37,6 +38,19 @@ def test_a_robot_with_a_constant_drift_ends_at_the_command(
     left = drift * (1 - RATE[0] * step) ** 2000
     np.testing.assert_allclose(state[:3], -(drift - left), atol=1e-9)
     np.testing.assert_allclose(trim.command(command, state) + drift, command + left, atol=1e-9)
+
+
+@given(st.floats(0.0, 0.3), st.floats(0.1, 0.2))
+def test_a_drift_that_takes_a_command_past_its_end_leaves_what_is_missing(
+    asked: float, drift: float
+) -> None:
+    trim, command = Trim(RATE * (1, 1, 1, 0, 0), MOST, ENDS), np.array([0.0, asked, 0.0])
+    state = START
+    for _ in range(2000):
+        seen = trim.command(command, state)
+        state = trim.next(state, command, seen - [0.0, drift, 0.0], 0.1)
+    missing = max(asked + drift - ENDS[1], 0.0)
+    np.testing.assert_allclose(seen[1] - drift, asked - missing, atol=1e-6)
 
 
 @given(st.floats(-0.09, 0.09), st.floats(-0.09, 0.09))
