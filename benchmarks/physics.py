@@ -17,6 +17,7 @@ from typing import Annotated
 
 import tyro
 
+from benchmarks.roll_outs import run_as_command, save
 from draft.design.references import find_design, open_design
 from draft.errors import DraftError
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
@@ -48,15 +49,16 @@ def main(
         stairs: whether to climb and descend stairs.
         warp: whether to measure on MuJoCo Warp too, which takes minutes on a CPU.
         only: labels of settings; all by default.
-        out: JSON file for the numbers.
+        out: JSON file for the numbers; those of other robots there are kept.
     """
     chosen = [
         one
         for one in SETTINGS
         if (warp or one.engine != "warp") and (not only or one.label in only)
     ]
-    rows = []
+    rows = [] if out is None or not out.is_file() else json.loads(out.read_text(encoding="utf-8"))
     for name in names:
+        rows = [row for row in rows if row["robot"] != name]
         member = _robot(name, robots)
         source, climber = open_source(policy, blind=True, robot=member), None
         if stairs and not source.of_any_legs:
@@ -69,8 +71,8 @@ def main(
             sys.stdout.flush()
             known = {key: round(x, 4) for key, x in values.items() if not math.isnan(x)}
             rows.append({"robot": name, "setting": one.label, **known})
-    if out is not None:
-        out.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        if out is not None:
+            save(out, rows)
 
 
 def _robot(name: str, robots: Path) -> LeggedRobot:
@@ -84,4 +86,4 @@ def _robot(name: str, robots: Path) -> LeggedRobot:
 
 
 if __name__ == "__main__":
-    tyro.cli(main, description=__doc__)
+    run_as_command(main, __doc__)

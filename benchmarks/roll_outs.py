@@ -292,7 +292,7 @@ def bars_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     return table
 
 
-def save(path: Path, data: Mapping[str, Any]) -> None:
+def save(path: Path, data: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> None:
     """Write results as JSON."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write(path, json.dumps(data, indent=1) + "\n")

@@ -1,15 +1,8 @@
 """What Draft predicts of real robots beside what is published: writes docs/real-robots.md.
 
-    python -m docs.real_robots                           # the page, from the measured columns
-    python -m docs.real_robots --measure ../shared/robots/survey unitree_go2 unitree_a1
-
-    python -m docs.real_robots --measure ../shared/robots/survey --train runs/own unitree_go2
-
-With `--measure` it measures robots first, of which a folder has the descriptions, and writes what
-`draft twin FILE --capabilities --json` prints to examples/results/real_robots, and which errors of
-the masses cause what. The bands that Draft states of learnt capabilities follow from them. With
-`--train` as well it trains policies of each robot's own instead, with predicted masses, and writes
-their numbers to examples/results/own_policies.
+python -m benchmarks.real_robots unitree_go2   # measures robots
+python -m docs.real_robots                     # the page, from what is measured
+python -m docs.real_robots --picture           # with the picture of the robots
 """
 
 from __future__ import annotations
@@ -17,36 +10,34 @@ from __future__ import annotations
 import json
 import math
 import statistics
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import tyro
-
+from benchmarks.real_robots import (
+    COMPARED,
+    OWN,
+    OWNED,
+    ROBOTS,
+    by_policy,
+    file_of,
+    ratios,
+    records,
+)
+from benchmarks.roll_outs import run_as_command
 from docs import engines, pictures
-from draft.cli.display.capabilities import SHOWN, record
+from draft.cli.display.capabilities import SHOWN
 from draft.errors import counted
 from draft.files import write
-from draft.learn.measuring.bands import FILE as BANDS
-from draft.learn.measuring.evaluation import setting
-from draft.learn.measuring.policies import open_source
 from draft.learn.policy.validity import ANY_NAME, FAMILY_NAME
 from draft.plotting import decorate, make_folder
 from draft.twins.compare import compare_twin
-from draft.validation.arms import predicted
-from draft.validation.capabilities import measured
 from draft.validation.causes import JUDGED as CAUSED
-from draft.validation.causes import causes
-from draft.validation.compare import RealRobot, real_robot
-from draft.validation.own import own_policy
 from draft.validation.physics import USUAL
 from draft.values import brief
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE, RESULTS = ROOT / "docs/real-robots.md", ROOT / "examples/results/real_robots"
-OWN = ROOT / "examples/results/own_policies"
-IMAGES = ROOT / "docs/images/real_robots"
+PAGE, IMAGES = ROOT / "docs/real-robots.md", ROOT / "docs/images/real_robots"
 PHYSICS = ROOT / "examples/results/physics.json"  # Of `python -m benchmarks.physics --out`.
 UNDER = ("top_speed", "kick", "step_up", "walking_power")
 JUDGED = {
@@ -93,102 +84,25 @@ before higher steps rather than falls, and was still learning. A policy of a mac
 
 The policy of all legs is asked at most 0.7 sqrt(g L) on two legs, a walk: what it does is no
 prediction of how fast these machines run. It walks with bent knees, which takes power."""
-COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
-OWNED = ("top_speed", "kick", "walking_power")
 _NEAR = 0.05  # Logarithm of the ratio of speeds whose labels would overlap.
-LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.
 
 
-def main(
-    keys: Annotated[tuple[str, ...], tyro.conf.Positional] = (),
-    /,
-    measure: Path | None = None,
-    policy: str | None = None,
-    train: Path | None = None,
-    seeds: int = 3,
-    iterations: int = 150,
-) -> None:
-    """Measure robots if asked, and write the page."""
-    if measure is not None and train is not None:
-        for seed in range(seeds):
-            for key in keys:
-                train_own(
-                    key, next(iter(sorted(measure.glob(f"{key}.*")))), train, seed, iterations
-                )
-    elif measure is not None:
-        RESULTS.mkdir(parents=True, exist_ok=True)
-        models = []
-        for key in keys:
-            file = next(iter(sorted(measure.glob(f"{key}.*"))))
-            print(key, file=sys.stderr)
-            found = real_robot(file, key=key, policy=policy)
-            text = json.dumps(record(found) | {"causes": _caused(found, policy)}, indent=1)
-            write(RESULTS / f"{key}.json", text + "\n")
-            models.append(found.twin.model)
-        if {row["robot"] for row in records()} <= set(keys):  # Of a few there is no picture.
-            pictures.row(models, IMAGES / "robots.png", (2000, 560))
+def main(picture: bool = False, robots: Path = ROBOTS) -> None:
+    """Write the page.
+
+    Args:
+        picture: whether to draw the robots anew.
+        robots: folder of their descriptions.
+    """
     rows = records()
-    write(BANDS, json.dumps(bands_of(rows), indent=1) + "\n")
+    if picture:
+        keys = [row["robot"] for row in rows]
+        files = {key: file_of(robots, key) for key in keys}
+        twins = [compare_twin(files[key], without=(key,), key=key, poses=2) for key in keys]
+        pictures.row([twin.model for twin in twins], IMAGES / "robots.png", (2000, 560))
     speeds(rows)
     write(PAGE, page(rows))
     print(PAGE)
-
-
-def _caused(found: RealRobot, policy: str | None) -> dict[str, dict[str, float]]:
-    """Causes of the differences between both columns, of robots with published figures."""
-    if found.policy != FAMILY_NAME or not found.verdicts:
-        return {}
-    return causes(
-        found.twin,
-        open_source(policy, blind=True, robot=predicted(found.twin)),
-        *setting("auto", "auto"),
-    )
-
-
-def train_own(key: str, file: Path, folder: Path, seed: int, iterations: int) -> None:
-    """Train and measure a policy of a robot's own with predicted masses, unless it is measured."""
-    path = OWN / f"{key}.json"
-    known: dict[str, Any] = {"seeds": {}}
-    if path.is_file():
-        known = json.loads(path.read_text(encoding="utf-8"))
-    if str(seed) in known["seeds"]:
-        return
-    print(key, seed, file=sys.stderr)
-    member = predicted(compare_twin(file, without=(key,), key=key, poses=2))
-    own = own_policy(member, folder / key, family=True, seed=seed, iterations=iterations)
-    found = measured(own, member, *setting("auto", "auto"))
-    values = {name: found[name].value for name in OWNED if not math.isnan(found[name].value)}
-    known |= {"robot": key, "iterations": iterations}
-    known["seeds"][str(seed)] = {name: round(value, 4) for name, value in values.items()}
-    OWN.mkdir(parents=True, exist_ok=True)
-    write(path, json.dumps(known, indent=1) + "\n")
-
-
-def bands_of(found: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Folds of capabilities by predicted masses that hold for nine robots of ten.
-
-    Robots that the policy of all legs drives do not count: it follows slower commands, and falls.
-    They are the ratios of rank ceil(0.9 (n + 1)) of n robots, which hold for 90 % of others like
-    these, whatever the distribution (split conformal prediction; Vovk et al. 2005).
-    """
-    rows, driven = {}, _by(FAMILY_NAME, found)
-    for name in COMPARED:
-        folds = sorted(abs(math.log(ratio)) for ratio in ratios(driven, name))
-        if len(folds) >= LEAST:
-            rank = min(math.ceil(SHARE * (len(folds) + 1)), len(folds))
-            fold = round(math.exp(folds[rank - 1]), 4)
-            rows[name] = {"robots": len(folds), "fold_90": fold}
-    return rows
-
-
-def ratios(found: Sequence[dict[str, Any]], name: str) -> list[float]:
-    """Predicted over maker's masses: ratios of a capability of the robots that have both."""
-    pairs = [(one["predicted"].get(name), one["maker"].get(name)) for one in found]
-    return [
-        ours["value"] / theirs["value"]
-        for ours, theirs in pairs
-        if ours and theirs and ours["value"] and theirs["value"]
-    ]
 
 
 def speeds(found: Sequence[dict[str, Any]]) -> None:
@@ -238,11 +152,6 @@ def speeds(found: Sequence[dict[str, Any]]) -> None:
     figure.savefig(IMAGES / "speeds.png", dpi=120)
 
 
-def records() -> list[dict[str, Any]]:
-    """Measured columns of all robots, by key."""
-    return [json.loads(path.read_text(encoding="utf-8")) for path in sorted(RESULTS.glob("*.json"))]
-
-
 def page(found: Sequence[dict[str, Any]]) -> str:
     """The page."""
     return "\n".join(
@@ -285,14 +194,9 @@ def page(found: Sequence[dict[str, Any]]) -> str:
 
 
 def _introduction(found: Sequence[dict[str, Any]]) -> list[str]:
-    driven, others = (len(_by(name, found)) for name in (FAMILY_NAME, ANY_NAME))
+    driven, others = (len(by_policy(name, found)) for name in (FAMILY_NAME, ANY_NAME))
     words = OTHERS.format(count=others) if others else UNDRIVEN
     return INTRODUCTION.format(count=len(found), driven=driven, others=words).splitlines()
-
-
-def _by(policy: str, found: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Robots that a policy drives."""
-    return [one for one in found if one["policy"] == policy]
 
 
 def _published(found: Sequence[dict[str, Any]]) -> list[str]:
@@ -316,7 +220,7 @@ def _published(found: Sequence[dict[str, Any]]) -> list[str]:
 
 def _score(found: Sequence[dict[str, Any]]) -> list[str]:
     """How often the rule holds; robots that the policy of all legs drives have their own lines."""
-    others = _by(ANY_NAME, found)
+    others = by_policy(ANY_NAME, found)
     lines = _held([one for one in found if one["policy"] != ANY_NAME])
     if others:
         lines += ["", "Of the robots that the policy of all legs drives:", "", *_held(others)]
@@ -385,7 +289,7 @@ def _ratios(found: Sequence[dict[str, Any]]) -> list[str]:
     ]
     for policy, of_policy in ((FAMILY_NAME, ""), (ANY_NAME, ", any legs")):
         for name in COMPARED:
-            of = ratios(_by(policy, found), name)
+            of = ratios(by_policy(policy, found), name)
             if not of:
                 continue
             spread = statistics.median(abs(math.log(ratio)) for ratio in of)
@@ -397,7 +301,7 @@ def _ratios(found: Sequence[dict[str, Any]]) -> list[str]:
 
 def _causes(found: Sequence[dict[str, Any]]) -> list[str]:
     """Table of the change that each error of the masses makes."""
-    rows = [one["causes"] for one in _by(FAMILY_NAME, found) if one.get("causes")]
+    rows = [one["causes"] for one in by_policy(FAMILY_NAME, found) if one.get("causes")]
     labels = list(dict.fromkeys(label for row in rows for of in row.values() for label in of))
     lines = [
         "Which error it is: the same with one of the maker's numbers in place of a predicted one,",
@@ -465,4 +369,4 @@ def _cell(one: dict[str, Any]) -> str:
 
 
 if __name__ == "__main__":
-    tyro.cli(main, description=__doc__)
+    run_as_command(main, __doc__)

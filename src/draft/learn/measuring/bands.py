@@ -1,8 +1,8 @@
 """How far capabilities err because masses are predicted: bands of real robots.
 
-`python -m docs.real_robots` writes the file: for each capability the fold within which nine of ten
-real robots have it by predicted masses and by those of their makers, by the same policy, noise and
-starts. docs/real-robots.md has the robots.
+`python -m benchmarks.real_robots` writes the file: for each capability the fold within which nine
+of ten real robots have it by predicted masses and by those of their makers, by the same policy,
+noise and starts. docs/real-robots.md has the robots.
 """
 
 from __future__ import annotations
