@@ -28,6 +28,7 @@ from draft.learn.bodies.slots import describe
 from draft.learn.engine.machine import NATIVE
 from draft.learn.measuring.policies import Source
 from draft.learn.measuring.utilisation import QUANTITIES, limiting, percentile
+from draft.learn.policy.policy import velocity_noise
 from draft.learn.policy.reduced import LegsPolicy, speed_units
 from draft.learn.silence import quiet
 from draft.learn.training.run import file_digest
@@ -252,6 +253,7 @@ def record_of(legs: LegsPolicy) -> dict[str, Any]:
         "megabytes": round(legs.file.stat().st_size / 1e6, 3),
         "iterations": int(texts["iteration"]),
         "seed": int(texts["seed"]),
+        "velocity_noise": velocity_noise(texts),
     }
 
 

@@ -134,6 +134,7 @@ def main(
         "policy": record_of(legs),
         "replicas": replicas,
         "seconds": seconds,
+        "velocity_noise": velocity_noise,  # None for that of each policy's training.
         "robots": [rows[entry.key] for entry in chosen],
     }
     show(found, Console(width=WIDTH))

@@ -79,10 +79,10 @@ region of validity, it takes the nearest numbers that it knows, says so and trie
 
 In this page velocities are per sqrt(g L) and rates of turn per sqrt(g / L), with the leg length L.
 Roll-outs last {seconds:g} s from noisy starts, with the delays and the noise of the training: the
-velocity that the policy observes errs by up to 0.1 m/s. With 0.5 m/s (`--velocity-noise 0.5`) 84 %
-of the real quadrupeds walk too, and 29 % of the bipeds and humanoids. An error is the mean distance
-of the trunk's velocity from the command, over time and over the roll-outs that stay up. Pushes
-change the velocity by up to {push:g} sqrt(g L) along x and along y, three times."""
+velocity that the policy observes errs by up to {noise:g} m/s. With 0.5 m/s (`--velocity-noise 0.5`)
+84 % of the real quadrupeds walk too, and 29 % of the bipeds and humanoids. An error is the mean
+distance of the trunk's velocity from the command, over time and over the roll-outs that stay up.
+Pushes change the velocity by up to {push:g} sqrt(g L) along x and along y, three times."""
 TRIM = """\
 A policy that meets a robot for the first time misses its commands by a constant: a robot that
 carries its mass further ahead drifts ahead. Whatever runs this policy therefore adds up the errors
@@ -205,6 +205,7 @@ def page(unseen: Mapping[str, Any], real: Mapping[str, Any], images: Sequence[st
     """
     action = unseen["action"]
     words = {"ms": f"{action['ms']:.2g}", "joints": action["joints"], "push": PUSH}
+    words["noise"] = unseen["policy"]["velocity_noise"]
     each = counted(unseen["replicas"], "roll-out")
     starts = real["replicas"]
     of_real = {"each": counted(starts, "roll-out"), "error": zero_shot.ERROR}

@@ -56,7 +56,7 @@ export class Robot {
     this.sensors = robot.policy ? ["imu_lin_vel", "imu_ang_vel"].map(
       (name) => this.model.sensor_adr[id(kinds.mjOBJ_SENSOR, name)]) : [];
     this.action = new Float64Array(joints.length);
-    this.state = new Float64Array(5); // Of the policy's trim.
+    this.trimmed = new Float64Array(5); // The state of the policy's trim.
     this.torque = new Float64Array(joints.length);
     this.observation = new Float32Array(network ? network.mean.length : 0);
     this.period = robot.policy ? Math.round(robot.policy.period / robot.policy.timestep) : 1;
@@ -170,7 +170,7 @@ export class Robot {
     this.qpos.set(other.data.qpos);
     this.qvel.set(other.data.qvel);
     this.action.set(other.action);
-    this.state.set(other.state);
+    this.trimmed.set(other.trimmed);
     this.since = other.since;
     this.lying = other.lying;
     this.mujoco.mj_forward(this.model, this.data);
@@ -193,7 +193,7 @@ export class Robot {
     if (moved && Number.isFinite(x + y)) { this.qpos[0] = x; this.qpos[1] = y; }
     this.q.forEach((at, i) => { this.qpos[at] += this.policy?.offsets[i] ?? 0; });
     this.action.fill(0);
-    this.state.fill(0);
+    this.trimmed.fill(0);
     this.torque.fill(0);
     this.since = 0;
     this.lying = NaN;
@@ -236,7 +236,7 @@ export class Robot {
     for (const [name] of policy.terms) {
       if (name === "base_lin_vel") for (let i = 0; i < 3; i++) put(sensordata[this.sensors[0] + i]);
       else if (name === "base_ang_vel") for (let i = 0; i < 3; i++) put(sensordata[this.sensors[1] + i]);
-      else if (name === "projected_gravity") for (let i = 0; i < 3; i++) put((this.state[3 + i] ?? 0) - this.xmat[9 * this.trunk + 6 + i]);
+      else if (name === "projected_gravity") for (let i = 0; i < 3; i++) put((this.trimmed[3 + i] ?? 0) - this.xmat[9 * this.trunk + 6 + i]);
       else if (name === "joint_pos") {
         for (let i = 0; i < q.length; i++) if (!policy.rolls[i]) put(numbers.sign[i] * (qpos[q[i]] - numbers.home[i]));
       } else if (name === "joint_vel") for (let i = 0; i < v.length; i++) put(numbers.sign[i] * qvel[v[i]]);
@@ -253,19 +253,19 @@ export class Robot {
     const ends = this.numbers.trim.slice(10);
     return this.command.map((asked, i) => {
       const end = Math.max(ends[i], Math.abs(asked));
-      return Math.min(end, Math.max(-end, asked + this.state[i]));
+      return Math.min(end, Math.max(-end, asked + this.trimmed[i]));
     });
   }
 
   /** Trim the next action, as `Trim.next`. */
   trim() {
-    const { numbers: { trim }, command, sensordata, sensors: [linear, angular], state } = this;
+    const { numbers: { trim }, command, sensordata, sensors: [linear, angular], trimmed } = this;
     const period = this.policy?.period ?? 0;
     const moving = [sensordata[linear], sensordata[linear + 1], sensordata[angular + 2]];
     const missing = moving.map((one, i) => command[i] - one);
     [...missing, -missing[0], -missing[1]].forEach((error, i) => {
       const most = trim[5 + i];
-      state[i] = Math.min(most, Math.max(-most, state[i] + trim[i] * period * error));
+      trimmed[i] = Math.min(most, Math.max(-most, trimmed[i] + trim[i] * period * error));
     });
   }
 
