@@ -259,10 +259,11 @@ def _own(found: Sequence[dict[str, Any]]) -> list[str]:
     if not rows:
         return []
     family = {one["robot"]: one["predicted"] for one in found}
-    seeds = max(len(row["seeds"]) for row in rows)
+    least, most = (of(len(row["seeds"]) for row in rows) for of in (min, max))
+    seeds = counted(most, "seed") if least == most else f"{least} to {counted(most, 'seed')}"
     lines = [
         f"Policies of their own: {rows[0]['iterations']} iterations each from the family's, with",
-        f"predicted masses; that of the family, then of {counted(seeds, 'seed')} of its own.",
+        f"predicted masses; that of the family, then of {seeds} of its own.",
         "",
         "| robot | " + " | ".join(JUDGED.get(name, LABELS.get(name, "")) for name in OWNED) + " |",
         "| --- |" + " --- |" * len(OWNED),
