@@ -48,7 +48,6 @@ BEFORE = 5696  # Iterations of the trainings that the policy goes on from.
 # Why robots do not walk, by name, as found by looking at them.
 CAUSES: Mapping[str, str] = {
     "anymal_d": "It sinks to two thirds of its height, near where a robot counts as fallen.",
-    "icub": "Its x axis points backward.",
 }
 WHY = """\
 The last training met bodies that the ones before had not: humanoids with longer legs under shorter

@@ -148,11 +148,19 @@ def test_a_hopper_has_a_leg_where_its_base_is_free() -> None:
 
 
 BESIDE = ((0, -0.3, 0), (0, -0.3, 0))
+
+
+# A leg of hip, knee and ankle, whose foot ends at so much along x and along y.
+def toes(x: float, y: float = 0.0) -> tuple[Point, ...]:
+    return ((0, 0, -0.3), (0, 0, -0.3), (x, y, -0.04))
+
+
 TURNED = {
     "y axis points up": robot(
         limb("l", "base", (0, 0, -0.1), BESIDE), limb("r", "base", (0, 0, 0.1), BESIDE)
     ),
     "y axis points forward": robot(*legs((0.1, 0), (-0.1, 0))),
+    "-x axis points forward": robot(*legs(*BIPED, ways=toes(-0.2))),
 }
 
 
@@ -160,6 +168,17 @@ TURNED = {
 def test_a_biped_with_other_axes_is_turned(axis: str) -> None:
     assert turned(TURNED[axis])[1] == axis
     assert found(TURNED[axis]).legs == 2
+
+
+@pytest.mark.parametrize("forward", [1, -1])
+def test_toes_of_a_biped_that_faces_sideways_tell_where_is_ahead(forward: int) -> None:
+    made, axis = turned(robot(*legs((0.1, 0), (-0.1, 0), ways=toes(0.0, 0.2 * forward))))
+    assert axis == "y axis points forward"
+    assert np.array(made.turned) @ [0, forward, 0] == pytest.approx([1, 0, 0])
+
+
+def test_shanks_that_end_behind_their_knees_are_no_toes() -> None:
+    assert turned(robot(*legs(*BIPED, ways=((0, 0, -0.3), (-0.15, 0, -0.3)))))[1] == ""
 
 
 def test_a_stated_population_holds_and_is_said() -> None:

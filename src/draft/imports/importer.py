@@ -225,7 +225,7 @@ def translate(
     doubts = plausibility.check(description)
     description, axis = upright(description)
     if axis:
-        cause = f"its {axis}: it is turned so that z does and x points forward"
+        cause = f"its {axis}: it is turned so that z points up and x forward"
         remedy = "poses of its base in its maker's software differ by that turn"
         doubts.append(Problem(cause, Location(description.file), remedy))
     wanted, limbs = population, find_limbs(description, population)

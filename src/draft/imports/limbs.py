@@ -31,6 +31,8 @@ ALIKE = 0.1
 MIDDLE = 0.02
 # Largest distance of a limb from the reflection of its pair, as a share of the robot's size.
 MIRRORED = 0.03
+# A foot points backwards if its middle lies behind its joint by this share of its length.
+BEHIND = 0.1
 HINGES, ARM_HINGES, PAIRED = 2, 3, 4
 SAMPLES = 100
 TURN = np.pi
@@ -100,33 +102,26 @@ def upright(description: Description) -> tuple[Description, str]:
 
     A file without a world has its robot in the axes of its root link. Where no limb reaches the
     ground along -z, but a mirrored pair does along another axis, that axis points down; a robot
-    with two legs faces along x.
+    with two legs faces along x, where its feet reach further from the ankle.
 
     Returns:
         The description, turned where it had to be, and which axis of it is up or forward; "".
     """
-    legs = _Skeleton(description).legs()[0]
-    axis = ""
+    legs, axis = _Skeleton(description).legs()[0], ""
     if not legs and not description.floats:
         for (name, rotation), facing in itertools.product(UPWARD.items(), (IDENTITY, FACING)):
             turned = description.turn(rotation).turn(facing)
             legs = _Skeleton(turned).standing()
             if len(legs) > 1:
-                return turned.turn(_about_face(turned, legs)), f"{name} axis points up"
+                description, axis = turned, f"{name} axis points up"
+                break
     if len(legs) == 2:
         apart = np.abs(legs[0].way[0].anchor - legs[1].way[0].anchor)
         if apart[0] > 2 * apart[1]:
-            description, axis = description.turn(FACING), f"{axis or 'y axis points forward'}"
+            description, axis = description.turn(FACING), axis or "y axis points forward"
+        if _Skeleton(description).faces_backwards():
+            description, axis = description.turn(ABOUT), axis or "-x axis points forward"
     return description, axis
-
-
-def _about_face(description: Description, legs: Sequence[_Limb]) -> Matrix:
-    """Half a turn where a biped's feet point backwards, else none."""
-    points = _Skeleton(description).points
-    by_name = {body.name: points[body] for body in points}
-    feet = [by_name[leg.way[-1].name].mean(axis=0) - leg.way[-1].anchor for leg in legs]
-    backwards = len(legs) == 2 and float(np.mean([way[0] for way in feet])) < 0
-    return ABOUT if backwards else IDENTITY
 
 
 def find_limbs(description: Description, wanted: str | None = None) -> Limbs:
@@ -218,6 +213,15 @@ class _Skeleton:
         if self.paired(limbs) and self.reach_down(limbs):
             return limbs, []
         return [], limbs
+
+    def faces_backwards(self) -> bool:
+        """Whether the feet of two legs, longer than high, reach further behind than ahead."""
+        feet = [self.points[leg.way[-1]] - leg.way[-1].anchor for leg in self.legs()[0]]
+        if len(feet) != 2:
+            return False
+        length, _, height = np.mean([np.ptp(foot, axis=0) for foot in feet], axis=0)
+        ahead = np.mean([foot[:, 0].mean() for foot in feet])
+        return bool(length > height and ahead < -BEHIND * length)
 
     def standing(self) -> list[_Limb]:
         """Legs that reach the ground in the zero pose, all in mirrored pairs."""
