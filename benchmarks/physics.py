@@ -46,7 +46,7 @@ def main(
         robots: folder of the descriptions.
         policy: run or ONNX file; the family's that ships by default.
         replicas: roll-outs at each level.
-        stairs: whether to climb and descend stairs.
+        stairs: whether to climb and descend stairs, which takes ten times as long.
         warp: whether to measure on MuJoCo Warp too, which takes minutes on a CPU.
         only: labels of settings; all by default.
         out: JSON file for the numbers; those of other robots there are kept.
@@ -63,10 +63,11 @@ def main(
         source, climber = open_source(policy, blind=True, robot=member), None
         if stairs and not source.of_any_legs:
             climber = source if policy else climbing_family()
-        print(f"| {name} | {' | '.join(SHOWN)} |")
+        shown = SHOWN if climber else [key for key in SHOWN if not key.startswith("step")]
+        print(f"| {name} | {' | '.join(shown)} |")
         measured = under_physics(source, member, chosen, replicas=replicas, climber=climber)
         for one, found in measured:
-            values = {key: found[key].value for key in SHOWN if key in found}
+            values = {key: found[key].value if key in found else math.nan for key in shown}
             print(f"| {one.label} | {' | '.join(f'{v:.3g}' for v in values.values())} |")
             sys.stdout.flush()
             known = {key: round(x, 4) for key, x in values.items() if not math.isnan(x)}

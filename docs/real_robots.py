@@ -327,6 +327,7 @@ def _physics() -> list[str]:
     rows = json.loads(PHYSICS.read_text(encoding="utf-8"))
     by_robot = {(row["robot"], row["setting"]): row for row in rows}
     robots = list(dict.fromkeys(row["robot"] for row in rows))
+    shown = [name for name in UNDER if any(name in row for row in rows)]
     lines = [
         "## Other physics",
         "",
@@ -334,12 +335,12 @@ def _physics() -> list[str]:
         "over those with the physics of the training, as the median over the robots and the least",
         "and the greatest. What falls by a sixth or more holds on that ground alone.",
         "",
-        "| physics | " + " | ".join(SHOWN[name][0] for name in UNDER) + " |",
-        "| --- |" + " --- |" * len(UNDER),
+        "| physics | " + " | ".join(SHOWN[name][0] for name in shown) + " |",
+        "| --- |" + " --- |" * len(shown),
     ]
     for setting_ in dict.fromkeys(row["setting"] for row in rows):
         cells = []
-        for name in UNDER:
+        for name in shown:
             of = [
                 by_robot[robot, setting_][name] / by_robot[robot, USUAL][name]
                 for robot in robots
