@@ -66,6 +66,20 @@ def test_only_designs_seeds_and_skills_in_common_are_compared(main: Study, tmp_p
     assert "main and other (the same numbers)" in made.caption
 
 
+def test_a_study_of_more_seeds_is_shown_by_all_of_its_seeds_too(
+    main: Study, tmp_path: Path
+) -> None:
+    made = comparison(main, read(faster(tmp_path / "other", {"cheetah": 1.25}, (0, 1, 2, 3))))
+    assert [column.title for column in made.columns][-2:] == ["main, all seeds", "other, all seeds"]
+    change, here, there = made.rows[0][-3:]
+    assert isinstance(change, Spread)
+    assert isinstance(here, Spread)
+    assert isinstance(there, Spread)
+    assert (change.count, here.count, there.count) == (3, 3, 4)
+    speeds = [1.25 * synthetic.able("cheetah", seed, "nominal")[0] for seed in range(4)]
+    assert (there.low, there.high) == (pytest.approx(min(speeds)), pytest.approx(max(speeds)))
+
+
 def test_results_of_one_name_have_columns_of_their_own(main: Study) -> None:
     made = comparison(main, main)
     assert [column.title for column in made.columns][2:4] == ["main", "other main"]

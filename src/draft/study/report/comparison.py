@@ -30,6 +30,7 @@ def comparison(study: Study, other: Study) -> Table:
     name = other.name if other.name != study.name else f"other {other.name}"
     rows: list[list[Cell]] = []
     notes, used = list[str](), set[int]()
+    whole = [study, other] if set(other.seeds) - set(study.seeds) else [study]
     for scalar in RANKED:
         here, there = _common(study, other, scalar)
         if not here:
@@ -44,7 +45,7 @@ def comparison(study: Study, other: Study) -> Table:
                     spread(values.values()),
                     spread(there[design].values()),
                     spread(100 * (ratio - 1) for ratio in ratios),
-                    by_seed(study, design, ARM, scalar).spread,
+                    *(by_seed(one, design, ARM, scalar).spread for one in whole),
                 ]
             )
         notes += _ranking(study, name, scalar, here, there)
@@ -56,7 +57,8 @@ def comparison(study: Study, other: Study) -> Table:
     notes += [f"{name}: {words}" for words in not_walking(other)]
     columns = [Column("skill"), Column("design"), Column(study.name, "", 2)]
     columns += [Column(name, "", 2), Column("change", "%", 0)]
-    columns.append(Column(f"{study.name}, all seeds", "", 2))
+    names = (study.name, name)[: len(whole)]
+    columns += [Column(f"{one}, all seeds", "", 2) for one in names]
     choices = "; ".join(_choices(study, other)) or "the same numbers"
     caption = (
         f"{study.name} and {name} ({choices}), "
