@@ -328,12 +328,20 @@ def _physics() -> list[str]:
     by_robot = {(row["robot"], row["setting"]): row for row in rows}
     robots = list(dict.fromkeys(row["robot"] for row in rows))
     shown = [name for name in UNDER if any(name in row for row in rows)]
+    none = [
+        f"the {SHOWN[name][0]} of {robot}"
+        for name in shown
+        for robot in robots
+        if name not in by_robot[robot, USUAL]
+    ]
     lines = [
         "## Other physics",
         "",
-        f"The same policy with {', '.join(robots)} (`python -m benchmarks.physics`): capabilities",
-        "over those with the physics of the training, as the median over the robots and the least",
-        "and the greatest. What falls by a sixth or more holds on that ground alone.",
+        "By the policy of all quadrupeds (`python -m benchmarks.physics`), with predicted masses:",
+        "capabilities over those with the physics of the training, as the median of",
+        f"{', '.join(robots)}, and the",
+        "least and the greatest. What falls by a sixth or more holds on that ground alone.",
+        *([f"Left out, since there is none as trained: {', '.join(none)}."] if none else []),
         "",
         "| physics | " + " | ".join(SHOWN[name][0] for name in shown) + " |",
         "| --- |" + " --- |" * len(shown),
