@@ -45,7 +45,7 @@ def test_a_drift_that_takes_a_command_past_its_end_leaves_what_is_missing(
     asked: float, drift: float
 ) -> None:
     trim, command = Trim(RATE * (1, 1, 1, 0, 0), MOST, ENDS), np.array([0.0, asked, 0.0])
-    state = START
+    state, seen = START, command
     for _ in range(2000):
         seen = trim.command(command, state)
         state = trim.next(state, command, seen - [0.0, drift, 0.0], 0.1)
