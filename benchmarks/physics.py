@@ -46,7 +46,7 @@ def main(
         robots: folder of the descriptions.
         policy: run or ONNX file; the family's that ships by default.
         replicas: roll-outs at each level.
-        stairs: whether to climb and descend stairs, which takes ten times as long.
+        stairs: whether to climb and descend stairs, which takes twice as long.
         warp: whether to measure on MuJoCo Warp too, which takes minutes on a CPU.
         only: labels of settings; all by default.
         out: JSON file for the numbers; those of other robots there are kept.
