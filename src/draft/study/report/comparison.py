@@ -57,13 +57,11 @@ def comparison(study: Study, other: Study) -> Table:
     notes += [f"{name}: {words}" for words in not_walking(other)]
     columns = [Column("skill"), Column("design"), Column(study.name, "", 2)]
     columns += [Column(name, "", 2), Column("change", "%", 0)]
-    names = (study.name, name)[: len(whole)]
-    columns += [Column(f"{one}, all seeds", "", 2) for one in names]
+    columns += [Column(f"{one}, all seeds", "", 2) for one in (study.name, name)[: len(whole)]]
     choices = "; ".join(_choices(study, other)) or "the same numbers"
     caption = (
-        f"{study.name} and {name} ({choices}), "
-        f"{seeds_in_words(sorted(used))}, nominal arm. A change within the range over all seeds "
-        "cannot be told from chance."
+        f"{study.name} and {name} ({choices}), {seeds_in_words(sorted(used))}, nominal arm. A "
+        "change within the range over all seeds cannot be told from chance."
     )
     return Table(f"against_{name}".replace(" ", "_"), caption, columns, rows, notes)
 
