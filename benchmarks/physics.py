@@ -17,6 +17,7 @@ from typing import Annotated
 
 import tyro
 
+from benchmarks.real_robots import ROBOTS, file_of
 from benchmarks.roll_outs import run_as_command, save
 from draft.design.references import find_design, open_design
 from draft.errors import DraftError
@@ -31,7 +32,7 @@ SHOWN = ("top_speed", "kick", "step_up", "step_down", "walking_power")
 def main(
     names: Annotated[tuple[str, ...], tyro.conf.Positional],
     /,
-    robots: Path = Path("../shared/robots/survey"),
+    robots: Path = ROBOTS,
     policy: str | None = None,
     replicas: int = 16,
     stairs: bool = False,
@@ -49,7 +50,7 @@ def main(
         stairs: whether to climb and descend stairs, which takes twice as long.
         warp: whether to measure on MuJoCo Warp too, which takes minutes on a CPU.
         only: labels of settings; all by default.
-        out: JSON file for the numbers; those of other robots there are kept.
+        out: JSON file for the numbers; those of other robots and settings there are kept.
     """
     chosen = [
         one
@@ -58,7 +59,8 @@ def main(
     ]
     rows = [] if out is None or not out.is_file() else json.loads(out.read_text(encoding="utf-8"))
     for name in names:
-        rows = [row for row in rows if row["robot"] != name]
+        anew = {(name, one.label) for one in chosen}
+        rows = [row for row in rows if (row["robot"], row["setting"]) not in anew]
         member = _robot(name, robots)
         source, climber = open_source(policy, blind=True, robot=member), None
         if stairs and not source.of_any_legs:
@@ -80,8 +82,7 @@ def _robot(name: str, robots: Path) -> LeggedRobot:
     try:
         find_design(name)
     except DraftError:
-        file = next(robots.glob(f"{name}.*"), robots / f"{name}.urdf")
-        found = compare_twin(file, poses=2, without=(name,), key=name)
+        found = compare_twin(file_of(robots, name), poses=2, without=(name,), key=name)
         return legged_robot(found.design, found.model)
     return legged_robot(open_design(name))
 
