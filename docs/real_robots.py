@@ -29,6 +29,7 @@ from docs import engines, pictures
 from draft.cli.display.capabilities import SHOWN
 from draft.errors import counted
 from draft.files import write
+from draft.laws.survey import read
 from draft.learn.policy.validity import ANY_NAME, FAMILY_NAME
 from draft.plotting import decorate, make_folder
 from draft.twins.compare import compare_twin
@@ -96,10 +97,13 @@ def main(picture: bool = False, robots: Path = ROBOTS) -> None:
     """
     rows = records()
     if picture:
-        keys = [row["robot"] for row in rows]
-        files = {key: file_of(robots, key) for key in keys}
-        twins = [compare_twin(files[key], without=(key,), key=key, poses=2) for key in keys]
-        pictures.row([twin.model for twin in twins], IMAGES / "robots.png", (2000, 560))
+        surveyed, models = {one.robot for one in read()}, []
+        for key in (row["robot"] for row in rows):
+            held = key if key in surveyed else ""
+            without = (held,) if held else ()
+            twin = compare_twin(file_of(robots, key), without=without, key=held, poses=2)
+            models.append(twin.model)
+        pictures.row(models, IMAGES / "robots.png", (2000, 560))
     speeds(rows)
     write(PAGE, page(rows))
     print(PAGE)
