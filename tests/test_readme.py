@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -61,3 +62,11 @@ def test_the_python_code_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert found
     for block in found:
         assert blocks.run_python(block).strip()
+
+
+def test_the_top_speeds_are_those_of_the_table_of_physics() -> None:
+    file = README.parent / "examples/results/physics.json"
+    rows = json.loads(file.read_text(encoding="utf-8"))
+    speeds = {row["robot"]: row["top_speed"] for row in rows if row["setting"] == "as trained"}
+    words = ", ".join(f"{speeds[name]:.1f}" for name in ("cheetah", "bear", "giraffe"))
+    assert f"| top speed of cheetah, bear, giraffe | {words} m/s;" in README.read_text("utf-8")

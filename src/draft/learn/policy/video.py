@@ -71,12 +71,15 @@ class Filmable(Protocol):
 class Film:
     """A camera that follows the first robot; the others are drawn too."""
 
-    def __init__(self, player: Filmable, size: tuple[int, int]) -> None:
+    def __init__(
+        self, player: Filmable, size: tuple[int, int], azimuth: float = _AZIMUTH
+    ) -> None:
         """Open a renderer.
 
         Args:
             player: the running policy.
             size: width and height [pixels].
+            azimuth: of the camera; 90 looks at the right side of a robot that faces x [deg].
 
         Raises:
             DraftError: MuJoCo cannot draw on this machine.
@@ -93,7 +96,7 @@ class Film:
         self._prepare(size)
         self._camera = mujoco.MjvCamera()
         self._camera.distance = self._distance
-        self._camera.azimuth, self._camera.elevation = _AZIMUTH, _ELEVATION
+        self._camera.azimuth, self._camera.elevation = azimuth, _ELEVATION
         self._drop = 0.18 * member.height
         self._at: NDArray[np.float64] | None = None
         self._speed, self._last = np.zeros(3), np.zeros(3)
