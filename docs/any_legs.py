@@ -2,6 +2,7 @@
 
     python -m benchmarks.any_legs --out examples/results/any_legs.json    # five minutes
     python -m benchmarks.zero_shot --out examples/results/zero_shot.json  # the same
+    python -m benchmarks.looks --out examples/results/looks.json          # half a minute
     python -m docs.any_legs --pictures   # film strips of robots that walk, and the page
     python -m docs.any_legs              # the page alone
 
@@ -23,7 +24,7 @@ prefer_offscreen()  # before MuJoCo is imported
 
 import mujoco  # noqa: E402
 
-from benchmarks import any_legs, zero_shot  # noqa: E402
+from benchmarks import any_legs, looks, zero_shot  # noqa: E402
 from benchmarks.roll_outs import PUSH, number, run_as_command  # noqa: E402
 from docs.pictures import shrink  # noqa: E402
 from draft.errors import counted  # noqa: E402
@@ -41,6 +42,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE, IMAGES = ROOT / "docs/any-legs.md", ROOT / "docs/images/any_legs"
 UNSEEN = ROOT / "examples/results/any_legs.json"
 REAL = ROOT / "examples/results/zero_shot.json"
+LOOKS = ROOT / "examples/results/looks.json"
 # Number of strips, shots of each, time that a robot walks [s], and sizes [pixels].
 PICTURES, SHOTS, SECONDS, SIZE, WIDTH = 12, 6, 4.0, (640, 360), 720
 _MASSES = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
@@ -105,6 +107,16 @@ of speed over its limit, or of the sum of both, which is 1 on the torque-speed l
 largest distance of a number of the robot from those of the training, per the width of their range.
 Names that begin with `twin` are further files of machines that are listed already and count once.
 Written by `python -m benchmarks.zero_shot`."""
+SEEN = """\
+Bodies of the generator, drawn with a third seed, walk at half of their fastest command in plain
+MuJoCo; the first row is the cheetah, the bear and the giraffe by their own policies, as a
+yardstick. Skating is the share of the load that feet carry while they slide, at more than a quarter
+of the speed asked; vibration the share of the power of the joints' velocities above {hertz:g} Hz;
+thighs' distance from the ground is per leg length, and the last column the largest motion of a
+joint outside the legs. Cells: the median, the least and the most of those that stay up. Written by
+`python -m benchmarks.looks`, which draws film strips too (`--pictures DIR`). Feet slide as those of
+the yardstick do and thighs stay away from the ground; robots on two legs vibrate more, in ankles
+and knees."""
 
 
 def main(
@@ -131,7 +143,8 @@ def main(
             old.unlink()
         for name in names:
             strip(legs, files[name], IMAGES / f"{name}.png")
-    write(PAGE, page(json.loads(UNSEEN.read_text(encoding="utf-8")), real, drawn()))
+    unseen, seen = (json.loads(file.read_text(encoding="utf-8")) for file in (UNSEEN, LOOKS))
+    write(PAGE, page(unseen, real, seen, drawn()))
     print(PAGE)
 
 
@@ -194,12 +207,18 @@ def strip(legs: LegsPolicy, file: Path, path: Path) -> None:
     print(f"{words}, {path.stat().st_size / 1000:.0f} kB")
 
 
-def page(unseen: Mapping[str, Any], real: Mapping[str, Any], images: Sequence[str]) -> str:
+def page(
+    unseen: Mapping[str, Any],
+    real: Mapping[str, Any],
+    seen: Mapping[str, Any],
+    images: Sequence[str],
+) -> str:
     """The page.
 
     Args:
         unseen: results of `benchmarks.any_legs`.
         real: results of `benchmarks.zero_shot`.
+        seen: results of `benchmarks.looks`.
         images: robots with film strips.
     """
     action = unseen["action"]
@@ -236,6 +255,12 @@ def page(unseen: Mapping[str, Any], real: Mapping[str, Any], images: Sequence[st
             *BODIES.format(bodies=unseen["bodies"], each=each).splitlines(),
             "",
             *_table(any_legs.COLUMNS, unseen["kinds"]),
+            "",
+            "## How they look",
+            "",
+            *SEEN.format(hertz=looks.VIBRATION).splitlines(),
+            "",
+            *_rows(looks.HEADINGS, [looks.cells(row) for row in seen["kinds"]]),
             "",
             "## Real robots",
             "",
@@ -286,8 +311,12 @@ def _bars(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _table(columns: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    lines = [f"| {' | '.join(columns)} |", "| --- |" + " ---: |" * (len(columns) - 1)]
-    return lines + [f"| {' | '.join(cell(row) for cell in columns.values())} |" for row in rows]
+    return _rows(tuple(columns), [[cell(row) for cell in columns.values()] for row in rows])
+
+
+def _rows(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    lines = [f"| {' | '.join(headings)} |", "| --- |" + " ---: |" * (len(headings) - 1)]
+    return lines + [f"| {' | '.join(row)} |" for row in rows]
 
 
 def _robots(real: Mapping[str, Any]) -> list[str]:

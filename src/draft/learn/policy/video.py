@@ -71,9 +71,7 @@ class Filmable(Protocol):
 class Film:
     """A camera that follows the first robot; the others are drawn too."""
 
-    def __init__(
-        self, player: Filmable, size: tuple[int, int], azimuth: float = _AZIMUTH
-    ) -> None:
+    def __init__(self, player: Filmable, size: tuple[int, int], azimuth: float = _AZIMUTH) -> None:
         """Open a renderer.
 
         Args:
