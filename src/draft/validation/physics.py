@@ -1,4 +1,4 @@
-"""Capabilities under other physics: steps, friction, contacts, delay, and the other engine.
+"""Capabilities under other physics: steps, friction, contacts, delay, noise, and another engine.
 
 A claim that holds under one setting only is a claim on the simulation and not on the robot.
 """
@@ -44,6 +44,8 @@ SETTINGS = (
     Setting("no delay", Extras(delay=0.0)),
     Setting("delay of 10 ms", Extras(delay=0.01)),
     Setting("delay of 20 ms", Extras(delay=0.02)),
+    Setting("no noise", Extras(noise=0.0)),
+    Setting("every part collides", Extras(all_collide=True)),
     Setting("MuJoCo Warp", Extras(), "warp"),
 )
 
