@@ -26,6 +26,7 @@ import mujoco  # noqa: E402
 
 from benchmarks import any_legs, looks, zero_shot  # noqa: E402
 from benchmarks.roll_outs import PUSH, number, run_as_command  # noqa: E402
+from docs import any_legs_text as text  # noqa: E402
 from docs.pictures import shrink  # noqa: E402
 from draft.errors import counted  # noqa: E402
 from draft.files import write  # noqa: E402
@@ -43,80 +44,11 @@ PAGE, IMAGES = ROOT / "docs/any-legs.md", ROOT / "docs/images/any_legs"
 UNSEEN = ROOT / "examples/results/any_legs.json"
 REAL = ROOT / "examples/results/zero_shot.json"
 LOOKS = ROOT / "examples/results/looks.json"
+RESULTS = (UNSEEN, REAL, LOOKS)
 # Number of strips, shots of each, time that a robot walks [s], and sizes [pixels].
 PICTURES, SHOTS, SECONDS, SIZE, WIDTH = 12, 6, 4.0, (640, 360), 720
 _MASSES = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 BEFORE = 5696  # Iterations of the trainings that the policy goes on from.
-# Why robots do not walk, by name, as found by looking at them.
-CAUSES: Mapping[str, str] = {
-    "anymal_d": "It sinks to two thirds of its height, near where a robot counts as fallen.",
-}
-WHY = """\
-The last training met bodies that the ones before had not: humanoids with longer legs under shorter
-torsos, whose centre of mass lies ahead of their feet or behind them, hip pitches whose axes slant,
-slower and faster drives. Policies had leant by the place of the hips, as the centre of mass was
-not among the numbers of a body: real humanoids that carry it further ahead ran after it, and fell.
-It is now, instead of the height of the trunk's frame, which makers put anywhere. That training was
-ended by the clock: bodies on two legs gained by it, and quadrupeds were still slower than before,
-as commands begin small again. What ships is the mean of the weights before and after it, which on
-bodies of validation (another seed) keeps most of both. Robots that fall lie outside the numbers of
-the training or near their ends, most by weak or slow ankles or slanting hips; but limx_oli, n1 and
-booster lie inside and fall all the same, as many drawn bodies with slanting hips do."""
-INTRODUCTION = """\
-Draft ships one policy for robots of any legs: two, four or six of them, with three to six driven
-joints each. The shipped hexapod, biped and humanoid walk with it; of real robots, nine of ten
-quadrupeds stay up at half a sqrt(g L), and three of five bipeds and humanoids at a quarter. It
-observes and moves joints by their place, which is the side, the order from the front and the role
-in the leg, and is told torques, speeds, inertias, lengths and the centre of mass of the body, all
-without units. For one robot that is an ordinary small network of its own joints, which NumPy runs
-in {ms} ms for {joints} joints. It has learnt on bodies that Draft draws, of six kinds in one run
-(`draft train any`), and has seen no real robot; but the widths of their draws were chosen anew
-after looking at how earlier policies walked these real robots, so that they are no blind test. It
-was trained in parts: {first} iterations, of which 3846 with a mistake in the code (a world that
-was given another body kept the home pose of the one before) and without a reward for turning, and
-{second} more from there (`draft train any --from any`); its weights are the mean of those before
-and after these (`python -m scripts.mean_of_policies`). Outside the ranges of these bodies, its
-region of validity, it takes the nearest numbers that it knows, says so and tries.
-
-In this page velocities are per sqrt(g L) and rates of turn per sqrt(g / L), with the leg length L.
-Roll-outs last {seconds:g} s from noisy starts, with the delays and the noise of the training: the
-velocity that the policy observes errs by up to {noise:g} m/s. With 0.5 m/s (`--velocity-noise 0.5`)
-84 % of the real quadrupeds walk too, and 29 % of the bipeds and humanoids. An error is the mean
-distance of the trunk's velocity from the command, over time and over the roll-outs that stay up.
-Pushes change the velocity by up to {push:g} sqrt(g L) along x and along y, three times."""
-TRIM = """\
-A policy that meets a robot for the first time misses its commands by a constant: a robot that
-carries its mass further ahead drifts ahead. Whatever runs this policy therefore adds up the errors
-of the velocity (`draft.learn.policy.trim`). On four legs and more the sum shifts the command, by at
-most 0.2 sqrt(g L) and never beyond those of the training. On two it shifts the direction of gravity
-that the policy observes, by at most 0.15, so that the robot leans back. Rates and bounds were
-chosen on generated bodies of another seed, with 0.5 m/s; those could not tell the leans apart, and
-ten real robots decided, which fall more often with a command that is shifted. The policy was
-trained without it."""
-BODIES = """\
-{bodies} bodies of the generator, drawn with another seed than those of the training, {each} each at
-every command, and kinds that were never trained: knees that point away from each other, five joints
-a leg, and eight legs. Cells: share that stays up, and the mean error; sideways and turning: share
-that stays up, and the velocity that was reached. Written by `python -m benchmarks.any_legs`."""
-ROBOTS = """\
-Machines from their makers' descriptions, with their joints, lengths, masses, inertias, torques and
-speeds, and the law's torques and speeds where a description has a placeholder; {each} each at every
-command. A robot walks if {up} of them stay up and the error is at most {error:g}. The nearest limit
-is that of the joints at the fastest command at which half stay up: the 95th percentile of torque or
-of speed over its limit, or of the sum of both, which is 1 on the torque-speed line. Outside: the
-largest distance of a number of the robot from those of the training, per the width of their range.
-Names that begin with `twin` are further files of machines that are listed already and count once.
-Written by `python -m benchmarks.zero_shot`."""
-SEEN = """\
-Bodies of the generator, drawn with a third seed, walk at half of their fastest command in plain
-MuJoCo; the first row is the cheetah, the bear and the giraffe by their own policies, as a
-yardstick. Skating is the share of the load that feet carry while they slide, at more than a quarter
-of the speed asked; vibration the share of the power of the joints' velocities above {hertz:g} Hz;
-thighs' distance from the ground is per leg length, and the last column the largest motion of a
-joint outside the legs. Cells: the median, the least and the most of those that stay up. Written by
-`python -m benchmarks.looks`, which draws film strips too (`--pictures DIR`). Feet slide as those of
-the yardstick do and thighs stay away from the ground; robots on two legs vibrate more, in ankles
-and knees."""
 
 
 def main(
@@ -133,7 +65,7 @@ def main(
         policy: policy of all legs.
         only: robots of the strips; by default a dozen that walk.
     """
-    real = json.loads(REAL.read_text(encoding="utf-8"))
+    unseen, real, seen = (json.loads(file.read_text("utf-8")) for file in RESULTS)
     if pictures:
         names = only or pictured(real)
         files = {entry.key: entry.file for entry in zero_shot.entries(robots)}
@@ -143,7 +75,6 @@ def main(
             old.unlink()
         for name in names:
             strip(legs, files[name], IMAGES / f"{name}.png")
-    unseen, seen = (json.loads(file.read_text(encoding="utf-8")) for file in (UNSEEN, LOOKS))
     write(PAGE, page(unseen, real, seen, drawn()))
     print(PAGE)
 
@@ -234,14 +165,16 @@ def page(
             "",
             "<!-- Written by `python -m docs.any_legs`; do not edit. -->",
             "",
-            *INTRODUCTION.format(
+            *text.INTRODUCTION.format(
                 **words,
                 seconds=unseen["seconds"],
                 first=BEFORE,
                 second=unseen["policy"]["iterations"],
             ).splitlines(),
             "",
-            *TRIM.splitlines(),
+            *text.TRIM.splitlines(),
+            "",
+            *text.DESIGNS.splitlines(),
             "",
             *_of_policy(unseen["policy"], real["policy"]),
             *_used(real),
@@ -252,25 +185,25 @@ def page(
             "",
             "## Bodies that it was not trained with",
             "",
-            *BODIES.format(bodies=unseen["bodies"], each=each).splitlines(),
+            *text.BODIES.format(bodies=unseen["bodies"], each=each).splitlines(),
             "",
             *_table(any_legs.COLUMNS, unseen["kinds"]),
             "",
             "## How they look",
             "",
-            *SEEN.format(hertz=looks.VIBRATION).splitlines(),
+            *text.SEEN.format(hertz=looks.VIBRATION).splitlines(),
             "",
             *_rows(looks.HEADINGS, [looks.cells(row) for row in seen["kinds"]]),
             "",
             "## Real robots",
             "",
-            *ROBOTS.format(**of_real).splitlines(),
+            *text.ROBOTS.format(**of_real).splitlines(),
             "",
             *_robots(real),
             *_pictures(images),
             "## What does not walk, and why",
             "",
-            *WHY.splitlines(),
+            *text.WHY.splitlines(),
             "",
             *_failures(real),
         )
@@ -357,7 +290,7 @@ def _failures(real: Mapping[str, Any]) -> list[str]:
             words = f"- {row['robot']}, at {at:g}: {number(one['up'], '%')} up{error}"
             if row["farthest"]:
                 words += f"; outside the region: {'; '.join(row['farthest'])}"
-            cause = CAUSES.get(row["robot"])
+            cause = text.CAUSES.get(row["robot"])
             lines.append(f"{words}. {cause}" if cause else f"{words}.")
     missing = [row for row in real["robots"] if "reason" in row and not row["again"]]
     if missing:

@@ -32,12 +32,9 @@ def _row(
 
 
 def test_the_page_is_that_of_the_results() -> None:
-    found = [json.loads(file.read_text(encoding="utf-8")) for file in _RESULTS]
+    found = [json.loads(file.read_text(encoding="utf-8")) for file in any_legs.RESULTS]
     text = any_legs.page(*found, any_legs.drawn())
     assert any_legs.PAGE.read_text(encoding="utf-8") == text
-
-
-_RESULTS = (any_legs.UNSEEN, any_legs.REAL, any_legs.LOOKS)
 
 
 @pytest.mark.parametrize(
