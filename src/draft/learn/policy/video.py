@@ -89,8 +89,7 @@ class Film:
         self._data = mujoco.MjData(self._model)
         self._trunk = self._model.body(prefix + member.trunk).id
         self._sun = self._model.light("draft_sun").id
-        feet = [prefix + name for name in member.feet]
-        self._distance = _DISTANCE * self._reach(member.home, feet)
+        self._distance = _DISTANCE * self._reach(member.home, [prefix + n for n in member.feet])
         self._prepare(size)
         self._camera = mujoco.MjvCamera()
         self._camera.distance = self._distance
