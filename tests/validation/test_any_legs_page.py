@@ -32,8 +32,8 @@ def _row(
 
 
 def test_the_page_is_that_of_the_results() -> None:
-    found = [json.loads(file.read_text(encoding="utf-8")) for file in any_legs.RESULTS]
-    text = any_legs.page(*found, any_legs.drawn())
+    found = (json.loads(file.read_text(encoding="utf-8")) for file in any_legs.RESULTS)
+    text = any_legs.page(*found, images=any_legs.drawn())
     assert any_legs.PAGE.read_text(encoding="utf-8") == text
 
 
