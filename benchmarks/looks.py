@@ -8,7 +8,7 @@ Robots walk ahead at half of their fastest command in plain MuJoCo: bodies of ev
 generator by the policy of all legs, drawn with another seed than those of the training, and shipped
 robots by the policies that ship for them, as a yardstick. It measures what an engineer would not
 believe: feet that skate, knees on the ground, joints that vibrate, arms that flail, a trunk that
-leans. It takes half a minute, and with strips some ten.
+leans. It takes half a minute, and with strips some twenty.
 """
 
 from __future__ import annotations
