@@ -123,7 +123,7 @@ def _walked(policy: Policy, member: LeggedRobot, pictures: Path | None) -> Looks
     if pictures is None:
         return looks_of(player)
     file = pictures / f"{member.name.replace(':', '-')}.png"
-    with film(player, file) as shoot:
+    with film(player, file, SECONDS, SIDE) as shoot:
         return looks_of(player, shoot)
 
 
@@ -212,13 +212,23 @@ def vibration(rates: Array, timestep: float) -> float:
 
 
 @contextlib.contextmanager
-def film(player: Playback, file: Path) -> Iterator[Any]:
-    """Draw a film strip of the last moments of a walk, unless the robot falls."""
+def film(player: Playback, file: Path, seconds: float, azimuth: float) -> Iterator[Any]:
+    """Draw a film strip of the last moments of a walk, unless the robot falls.
+
+    Args:
+        player: the robot with its policy.
+        file: PNG file.
+        seconds: duration of the walk [s].
+        azimuth: of the camera [deg].
+
+    Yields:
+        A function to call with the number of actions done.
+    """
     from draft.learn.policy.video import Film
 
-    wanted = moments(player.steps(SECONDS), SHOTS, player.period)
+    wanted = moments(player.steps(seconds), SHOTS, player.period)
     shots: list[Shot] = []
-    with contextlib.closing(Film(player, SIZE, SIDE)) as camera:
+    with contextlib.closing(Film(player, SIZE, azimuth)) as camera:
 
         def shoot(step: int) -> None:
             if step in wanted:
@@ -226,7 +236,7 @@ def film(player: Playback, file: Path) -> Iterator[Any]:
                 shots.append(camera.shot(step * player.period))
 
         yield shoot
-    if len(shots) == len(wanted):
+    if not player.falls:
         save_strip(file, shots)
 
 

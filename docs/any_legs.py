@@ -11,7 +11,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -35,7 +34,6 @@ from draft.learn.bodies.legged import LeggedRobot  # noqa: E402
 from draft.learn.policy.playback import Playback, Scenario  # noqa: E402
 from draft.learn.policy.policy import ANY, Policy  # noqa: E402
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
-from draft.learn.policy.strip import INTERVAL, Shot, moments, save  # noqa: E402
 from draft.twins.compare import Comparison, compare_twin  # noqa: E402
 from draft.validation.arms import by_maker  # noqa: E402
 
@@ -45,8 +43,8 @@ UNSEEN = ROOT / "examples/results/any_legs.json"
 REAL = ROOT / "examples/results/zero_shot.json"
 LOOKS = ROOT / "examples/results/looks.json"
 RESULTS = (UNSEEN, REAL, LOOKS)
-# Number of strips, shots of each, time that a robot walks [s], and sizes [pixels].
-PICTURES, SHOTS, SECONDS, SIZE, WIDTH = 12, 6, 4.0, (640, 360), 720
+# Number of strips, time that a robot walks [s], and width of a strip [pixels].
+PICTURES, SECONDS, WIDTH = 12, 4.0, 720
 _MASSES = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 BEFORE = 5696  # Iterations of the trainings that the policy goes on from.
 
@@ -112,28 +110,19 @@ class _Maker(Playback):
 
 def strip(legs: LegsPolicy, file: Path, path: Path) -> None:
     """Draw a film strip of a robot at the command of its bar, unless it falls."""
-    from draft.learn.policy.video import Film
+    from draft.learn.policy.video import AZIMUTH
 
     twin = compare_twin(file, poses=2, key=path.stem)
     member = by_maker(twin)
     speed = zero_shot.AT[zero_shot.group_of({"legs": len(member.feet)})]
     root = math.sqrt(GRAVITY * member.leg_length)
     player = _Maker(legs.of_robot(member), twin, member, speed * root)
-    wanted = moments(player.steps(SECONDS), SHOTS, player.period)
-    shots: list[Shot] = []
-    with contextlib.closing(Film(player, SIZE)) as camera:
-
-        def shoot(step: int) -> None:
-            if step in wanted:
-                camera.frame(INTERVAL)
-                shots.append(camera.shot(step * player.period))
-
+    with looks.film(player, path, SECONDS, AZIMUTH) as shoot:
         outcome = player.play(SECONDS, shoot)
     words = f"{path.stem}: {outcome.speed / root:.2f} sqrt(g L)"
     if outcome.falls:
         print(f"{words}, {counted(outcome.falls, 'fall')}: left out")
         return
-    save(path, shots)
     shrink(path, WIDTH)
     print(f"{words}, {path.stat().st_size / 1000:.0f} kB")
 

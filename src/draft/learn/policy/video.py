@@ -24,7 +24,7 @@ Pixels = NDArray[np.uint8]
 Sink = Generator[None, Pixels | None, None]  # imageio's: takes frames by `send`.
 SIZE = (960, 540)
 _RATE = 25.0  # Frames per second.
-_DISTANCE, _AZIMUTH, _ELEVATION = 3.6, 128.0, -15.0  # Distance per reach of the feet; [deg].
+_DISTANCE, AZIMUTH, _ELEVATION = 3.6, 128.0, -15.0  # Distance per reach of the feet; [deg].
 _FIELD_OF_VIEW = 38.0  # [deg]
 _LAG = 0.25  # Time constant of the camera's position [s].
 _PACE = 0.5  # Time constant of the camera's speed, so that it keeps up with a fast robot [s].
@@ -71,7 +71,7 @@ class Filmable(Protocol):
 class Film:
     """A camera that follows the first robot; the others are drawn too."""
 
-    def __init__(self, player: Filmable, size: tuple[int, int], azimuth: float = _AZIMUTH) -> None:
+    def __init__(self, player: Filmable, size: tuple[int, int], azimuth: float = AZIMUTH) -> None:
         """Open a renderer.
 
         Args:
