@@ -8,7 +8,8 @@ import json
 import shlex
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -65,6 +66,24 @@ def test_a_constraint_is_missed_by_the_share_that_lacks() -> None:
     assert missed[:, 0].tolist() == [0.0, 1.0, 0.0]
     assert missed[:, 1] == pytest.approx([0.5, 0.25, 0.0])
     assert missed[:, 2] == pytest.approx([0.0, 0.0, 0.25], abs=1e-8)
+
+
+@given(st.floats(-20, 20), st.floats(0, 20), st.sampled_from(["<=", ">="]), st.booleans())
+def test_a_constraint_is_missed_the_more_the_further_a_design_is_from_it(
+    limit: float, step: float, sign: str, first: bool
+) -> None:
+    text = f"thigh_length {sign} {limit}"
+    if first:
+        text = f"{limit} {'<=' if sign == '>=' else '>='} thigh_length"
+    (one,) = goals.constraints(SPEC, [text])
+    away = 1.0 if sign == "<=" else -1.0
+    gaps = np.array([0.0, 0.01, 0.02, 0.02 + step, 100.0])
+    design = SimpleNamespace(parameters={"thigh_length": limit + away * gaps}, count=len(gaps))
+    missed = one.violation(cast("draft.Design", design), {})
+    assert missed[0] == 0
+    assert missed[1] > 0
+    assert (np.diff(missed) >= 0).all()
+    assert missed[-1] > missed[1]
 
 
 def test_a_search_begins_with_designs_that_meet_the_constraints() -> None:
@@ -249,6 +268,7 @@ def test_conditions_that_nothing_meets_are_counted(run: Run, command: Command) -
     out = command(f"optimise robot {words}", *ARGUMENTS).out
     assert "12 trials, and none meets all conditions:" in out
     assert "leg.mass < 0.001: fails in 12 of 12" in out
+    assert out.endswith("written to o: front.csv, front.json\n")
 
 
 def test_a_full_disk_is_bad_input_and_the_search_resumes(

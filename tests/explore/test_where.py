@@ -27,6 +27,8 @@ TWO = axes.parse(SPEC, ["thigh_length=0.2:0.7", "actuators.leg.peak_torque=40:50
         ("1 < leg.mas", "`where`:1:5: an actuator has no 'mas' to read\n  did you mean 'mass'?"),
         ("print(1)", "unknown function 'print'"),
         ("accepted; 1", "`where`:1:9: 'accepted; 1' is not an expression"),
+        ("mass < 30 kg", "write 30 without 'kg': all numbers are in SI units"),
+        ("mass = 30", "write == to compare"),
         ("[1]", "'[1]' is not allowed in an expression"),
     ],
 )
@@ -34,6 +36,14 @@ def test_what_is_no_condition_is_said_with_its_column(text: str, message: str) -
     with pytest.raises(draft.DraftError) as raised:
         where.condition(SPEC, text)
     assert message in str(raised.value)
+
+
+@pytest.mark.parametrize("text", ["mass", "accepted and leg.mass", "thigh_length"])
+def test_a_number_is_no_condition(text: str) -> None:
+    name = text.rpartition(" ")[2]
+    with pytest.raises(draft.DraftError, match=f"'{name}' is a number, not a condition"):
+        where.parts(SPEC, text)
+    assert where.parts(SPEC, f"{text} > 1 and accepted and not accepted")
 
 
 def test_a_condition_reads_parameters_actuators_metrics_and_the_verdict(

@@ -46,6 +46,6 @@ def main(
         for one in front[:10]:
             words = ", ".join(f"{name} {value:.4g}" for name, value in one["goals"].items())
             print(f"  {one['design']}: {words}")
-        drawn = ", front.png, front.pdf" if settings.figure else ""
-        print(f"written to {out}: front.csv, front.json, designs/{drawn}")
+        made = [*["designs/"] * bool(front), *["front.png", "front.pdf"] * settings.figure]
+        print(f"written to {out}: {', '.join(['front.csv', 'front.json', *made])}")
     return 0

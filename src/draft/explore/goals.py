@@ -14,10 +14,10 @@ from draft.explore import where
 from draft.explore.where import Condition
 from draft.metrics import LEARNED
 from draft.spec import Spec
-from draft.spec.expressions import syntax_tree
 from draft.values import Array, Value
 
 _WORST = 1e9  # violation by a design for which a compared number is undefined
+_LEAST = 1e-9  # violation by a design that is at a limit, and size of a limit of zero
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,30 +48,36 @@ class Constraint:
         text: the condition, as written.
         holds: the condition.
         gap: smaller and larger side of a comparison; None for any other condition.
+        limit: which of them is the limit that the other side is compared with.
     """
 
     text: str
     holds: Condition
     gap: tuple[Condition, Condition] | None
+    limit: int = 1
 
     def violation(self, design: Design, metrics: Mapping[str, Value]) -> Array:
         """Violation by each design, shape (N,); zero where the condition holds.
 
-        For a comparison it is the difference of the sides over the larger of them, which gives a
-        search a direction; for any other condition it is one.
+        For a comparison it is the difference of the sides over the larger of them. Where they have
+        not the same sign, which leaves no such size, it is one and the logarithm of the compared
+        side over the limit: it grows with the distance, whatever the limit, and so gives a search
+        a direction. For any other condition it is one.
         """
         holds = self.holds.holds(design, metrics)
         violation: Array = np.ones(design.count or 1)
         if self.gap is not None:
-            small, large = (
-                np.asarray(side.value(design, metrics), dtype=np.float64) for side in self.gap
-            )
-            size = np.maximum(np.maximum(abs(small), abs(large)), 1e-9)
+            sides = [np.asarray(one.value(design, metrics), dtype=np.float64) for one in self.gap]
+            (small, large), limit = sides, np.maximum(abs(sides[self.limit]), _LEAST)
+            size = np.maximum(np.maximum(abs(small), abs(large)), _LEAST)
+            alike = (small * large > 0) & (limit > _LEAST)
             with np.errstate(invalid="ignore"):  # Both may be without a limit.
-                violation = np.broadcast_to((small - large) / size, violation.shape)
+                apart = 1.0 + np.log1p(abs(sides[1 - self.limit]) / limit)
+                found = np.where(alike, (small - large) / size, apart)
+                violation = np.broadcast_to(found, violation.shape)
             # A strict comparison also fails for equal sides.
             finite = np.isfinite(violation)
-            violation = np.where(finite, np.maximum(violation, 1e-9), _WORST)
+            violation = np.where(finite, np.maximum(violation, _LEAST), _WORST)
         return np.where(holds, 0.0, violation)
 
 
@@ -103,34 +109,27 @@ def constraints(spec: Spec, texts: Sequence[str]) -> tuple[Constraint, ...]:
     """Parse constraints; each part of an `and` becomes a constraint.
 
     Raises:
-        DraftError: a text is not an expression, or a name is unknown.
+        DraftError: a text is not an expression or is a number, or a name is unknown.
     """
     found: list[Constraint] = []
     for text in texts:
-        where.condition(spec, text, "`subject_to`")  # reports errors with their column
-        for node in conjuncts(syntax_tree(text.strip()).body):
-            found.append(_constraint(spec, node))
+        found += [_constraint(spec, node) for node in where.parts(spec, text, "`subject_to`")]
     return tuple(found)
-
-
-def conjuncts(node: ast.expr) -> list[ast.expr]:
-    """Parts of an `and`, or the node itself."""
-    if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
-        return [part for value in node.values for part in conjuncts(value)]
-    return [node]
 
 
 def _constraint(spec: Spec, node: ast.expr) -> Constraint:
     def condition(part: ast.expr) -> Condition:
         return where.condition(spec, ast.unparse(part), "`subject_to`")
 
-    gap = None
+    gap, limit = None, 1
     match node:
         case ast.Compare(left=left, ops=[ast.Lt() | ast.LtE()], comparators=[right]):
             gap = (condition(left), condition(right))
         case ast.Compare(left=left, ops=[ast.Gt() | ast.GtE()], comparators=[right]):
-            gap = (condition(right), condition(left))
-    return Constraint(ast.unparse(node), condition(node), gap)
+            gap, limit = (condition(right), condition(left)), 0
+    if gap is not None and not gap[1 - limit].expression.names:
+        limit = 1 - limit  # A number is on the left.
+    return Constraint(ast.unparse(node), condition(node), gap, limit)
 
 
 def by_rollouts(condition: Constraint) -> bool:

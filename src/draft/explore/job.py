@@ -161,7 +161,7 @@ def make(
     axes = parse(spec, settings.vary, fixed)
     count = sampling.rounded(axes, settings.sampler, settings.n)
     if settings.where is not None:
-        where.condition(spec, settings.where)
+        where.parts(spec, settings.where)
     job = Job(
         kind,
         _files(spec),

@@ -14,7 +14,7 @@ import numpy as np
 
 from draft.design import Design
 from draft.errors import DraftError
-from draft.explore import goals
+from draft.explore import goals, where
 from draft.explore.goals import Constraint, by_rollouts
 from draft.explore.nearest import Search, Solution
 from draft.explore.sensitivity import stated_numbers
@@ -106,7 +106,7 @@ def contradictory(texts: Sequence[str]) -> None:
     """
     ends: dict[str, dict[bool, tuple[float, bool, str]]] = {}
     for text in texts:
-        for node in goals.conjuncts(syntax_tree(text.strip()).body):
+        for node in where.conjuncts(syntax_tree(text.strip()).body):
             match node:
                 case ast.Compare(
                     left=left, ops=[ast.Lt() | ast.LtE() as sign], comparators=[right]

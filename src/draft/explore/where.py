@@ -7,6 +7,7 @@ A condition is an expression, in the language of specs, of parameters, values of
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -23,7 +24,7 @@ from draft.metrics import LEARNED, METRICS, find, of_design
 from draft.metrics.learned import PREFIX
 from draft.metrics.registry import RENAMED, misfit, of_spec, unknown
 from draft.spec import Spec
-from draft.spec.expressions import Expression, parse
+from draft.spec.expressions import Expression, parse, syntax_tree
 from draft.values import Value
 
 ACCEPTED = "accepted"
@@ -102,6 +103,33 @@ def condition(spec: Spec, text: str, option: str = "`where`") -> Condition:
         if problem is not None:
             raise DraftError(problem)
     return Condition(expression, tuple(sorted(_metrics(spec, expression))), quantiles)
+
+
+def conjuncts(node: ast.expr) -> list[ast.expr]:
+    """Parts of an `and`, or the node itself."""
+    if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
+        return [part for value in node.values for part in conjuncts(value)]
+    return [node]
+
+
+def parts(spec: Spec, text: str, option: str = "`where`") -> list[ast.expr]:
+    """Parts of a condition that all have to hold.
+
+    Raises:
+        DraftError: as `condition`, or one of them is a number, which would hold wherever it is
+            not zero.
+    """
+    condition(spec, text, option)  # Reports errors with their column.
+    found = conjuncts(syntax_tree(text.strip()).body)
+    for node in found:
+        name = ast.unparse(node)
+        metric = METRICS.get(name) or LEARNED.get(name)
+        own = spec.parameters.get(name)
+        unit = own.unit if own is not None else "" if metric is None else metric.unit
+        if unit not in ("", "1", "bool") or name.partition(".")[2] in QUANTITIES:
+            cause = f"{option}: '{name}' is a number, not a condition"
+            raise DraftError(cause, f"compare it, such as '{name} < 1'")
+    return found
 
 
 def _metrics(spec: Spec, expression: Expression) -> set[str]:

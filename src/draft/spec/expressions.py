@@ -31,6 +31,8 @@ RESERVED = frozenset((*FUNCTIONS, *CONSTANTS, *keyword.kwlist))
 
 _NUMBER_LIKE = re.compile(r"(?<![\w.])\.?\d(?:[eE][-+]|[\w.])*")
 _NUMBER = re.compile(r"([0-9][0-9_]*(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
+_ONE_SIGN = re.compile(r"(?<![<>=!])=(?!=)")
+_WITH_UNIT = re.compile(r"(?<![\w.])([\d.]+)\s+([^\W\d]\w*)")
 ALLOWED = "an expression may use + - * / % **, comparisons, 'a if c else b', and the functions " + (
     " ".join(sorted(FUNCTIONS))
 )
@@ -121,8 +123,8 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
     except SyntaxError as error:
         end = len(text) + 1
         at = _shifted(where, min(error.offset or end, end) - 1)
-        remedy = COMMA if "never closed" in error.msg or "unmatched" in error.msg else ALLOWED
-        raise _bad(f"'{_short(text)}' is not an expression: {error.msg}", remedy, at) from None
+        cause = f"'{_short(text)}' is not an expression: {error.msg}"
+        raise _bad(cause, _remedy(text, error.msg), at) from None
     except (ValueError, RecursionError, MemoryError):
         raise _bad("the expression cannot be read", ALLOWED, where) from None
     names: set[str] = set()
@@ -135,6 +137,18 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
     except ResolveError as error:
         raise SpecError(error.problems) from None
     return Expression(text, frozenset(), where, float(constant))
+
+
+def _remedy(text: str, message: str) -> str:
+    """What to do about a text that Python's parser refuses."""
+    if "never closed" in message or "unmatched" in message:
+        return COMMA
+    if _ONE_SIGN.search(text):
+        return "write == to compare"
+    found = _WITH_UNIT.search(text)
+    if found and not keyword.iskeyword(found[2]):
+        return f"write {found[1]} without '{found[2]}': all numbers are in SI units"
+    return ALLOWED
 
 
 def syntax_tree(text: str) -> ast.Expression:

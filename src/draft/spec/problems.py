@@ -77,7 +77,7 @@ def _cause_and_remedy(
     found = f"found {_shown(value)}"
     match kind:
         case "model_type" | "dict_type":
-            return f"{_MAPPING}, {found}", ""
+            return f"{_MAPPING}, {found}", "write 'key: value', one per line"
         case "list_type":
             return f"expected a list, {found}", "write [a, b, ...], or one '- ...' per line"
         case "string_type":
