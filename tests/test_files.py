@@ -36,6 +36,23 @@ def test_what_cannot_be_written_leaves_what_was(tmp_path: Path) -> None:
     assert names(tmp_path) == ["file", "folder"]
 
 
+def test_an_output_has_its_suffix_and_replaces_only_its_like(tmp_path: Path) -> None:
+    (tmp_path / "mine.html").write_text("mine", encoding="utf-8")
+    (tmp_path / "folder.html").mkdir()
+    for name, said in {
+        "a.pdf": r"`out` '.*a.pdf' does not end in .html",
+        "folder.html": "is a folder",
+        "mine.html/a.html": "mine.html is not a folder",
+        "mine.html": "was not written by this command; it is kept",
+    }.items():
+        with pytest.raises(DraftError, match=said):
+            files.check_output(tmp_path / name, ".html", mark="Draft")
+    (tmp_path / "ours.HTML").write_text("by Draft", encoding="utf-8")
+    for name in ("ours.HTML", "new/a.html"):
+        assert files.check_output(tmp_path / name, ".html", mark="Draft") == tmp_path / name
+    assert names(tmp_path) == ["folder.html", "mine.html", "ours.HTML"]
+
+
 def test_a_file_appears_after_its_content_is_on_the_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,10 +16,11 @@ def run() -> int:
 def _choose_rendering(arguments: Sequence[str]) -> None:
     """Choose how MuJoCo renders for a command, before it is imported."""
     command = [*arguments[:1]]
-    if command in (["twin"], ["import"], ["play"], ["mcp"]) or [*arguments[:2]] == [
-        "study",
-        "report",
-    ]:
+    draws = command in (["twin"], ["import"], ["play"], ["mcp"]) or (
+        [*arguments[:2]] == ["study", "report"]
+        or (command == ["report"] and "--figures" in (one.split("=")[0] for one in arguments))
+    )
+    if draws:
         prefer_offscreen()
     elif command not in (["view"], ["study"], ["doctor"]):
         # The workers of a study choose for themselves, and `doctor` reports the user's choice.

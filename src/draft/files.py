@@ -69,6 +69,37 @@ def write(path: Path, content: str | bytes) -> None:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
+def check_output(name: str | Path, suffix: str, option: str = "`out`", mark: str = "") -> Path:
+    """Return the path of a file that a command is going to write, checked before the work starts.
+
+    Args:
+        name: the file.
+        suffix: how its name has to end, such as ".html".
+        option: option that names it, for messages.
+        mark: text in what the command writes: a file without it is another's.
+
+    Raises:
+        DraftError: the name ends otherwise, it cannot be written, or it would replace what the
+            command has not written.
+    """
+    path = Path(name)
+    if str(name) and path.is_dir():
+        raise DraftError(f"{option} '{name}' is a folder", f"name a file in it: FILE{suffix}")
+    if path.suffix.lower() != suffix:
+        example = f"{path.stem or 'name'}{suffix}"
+        raise DraftError(f"{option} '{name}' does not end in {suffix}", f"such as {example}")
+    if path.exists() and mark and mark.encode() not in path.read_bytes():
+        cause = f"'{path}' exists and was not written by this command; it is kept"
+        raise DraftError(cause, f"choose another {option}")
+    for parent in path.absolute().parents:
+        if parent.is_dir():
+            break
+        if parent.exists():
+            cause = f"{option} '{name}': {parent} is not a folder"
+            raise DraftError(cause, "choose another path")
+    return path
+
+
 @contextmanager
 def new_file(
     path: Path,

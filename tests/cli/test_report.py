@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from draft.__main__ import _choose_rendering
+from draft.browser.engine import available
+from draft.learn.policy.policy import FAMILY
 from draft.reporting import figures
 from tests.commands import Command
 from tests.written import files_below
@@ -45,6 +48,29 @@ def test_figures_are_png_and_pdf(monkeypatch: pytest.MonkeyPatch, command: Comma
     command("report robot robot:long --figures figures")
     names = ("masses", "actuators", "torque_speed", "metrics", "parameters")
     assert files_below(Path("figures")) == {f"{n}.{kind}" for n in names for kind in ("png", "pdf")}
+
+
+def test_a_policy_of_another_robot_is_refused(command: Command) -> None:
+    said = command.refuses("report humanoid --walk --policy", FAMILY)
+    assert "family.onnx drives no robot here: the robot has 2 legs, and the policy drives 4" in said
+    if available():
+        assert said == command.refuses("page humanoid --policy", FAMILY)
+    command("report humanoid cheetah --walk --policy", FAMILY)
+
+
+def test_a_page_is_an_html_file(command: Command) -> None:
+    assert "--out 'robot/tree.yaml' does not end in .html" in command.refuses(
+        "report robot --out robot/tree.yaml"
+    )
+
+
+def test_figures_are_drawn_without_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen = []
+    monkeypatch.setattr("draft.__main__.prefer_offscreen", lambda: chosen.append("offscreen"))
+    monkeypatch.setattr("draft.__main__.disable_drawing", lambda: chosen.append("disabled"))
+    for line in ("report bear", "report bear --figures d", "report bear --figures=d"):
+        _choose_rendering(line.split())
+    assert chosen == ["disabled", "offscreen", "offscreen"]
 
 
 def test_a_build_may_have_a_report(command: Command) -> None:

@@ -20,6 +20,7 @@ from tests.commands import Command
 
 QUADRUPED = draft.load("quadruped")
 CHEETAH, BEAR = (QUADRUPED.resolve(name) for name in ("cheetah", "bear"))
+HUMANOID = draft.load("humanoid").resolve()
 VARY = {
     "thigh_length": (0.2, 0.4),
     "shank_length": (0.2, 0.4),
@@ -125,6 +126,14 @@ def test_what_excludes_each_other_is_the_smallest_set() -> None:
         assert re.fullmatch(r"(mass <= 15|payload_rated >= 200|top_speed >= 2), and it is .*", miss)
 
 
+@pytest.mark.parametrize("condition", ["payload_hour >= 0.001", "payload_hour >= 0"])
+def test_the_design_that_misses_least_is_better_than_the_first(condition: str) -> None:
+    found = solve(HUMANOID, [condition], {"thigh_length": (0.18, 0.22)})
+    assert found.conflict is not None
+    first = float(of_design(HUMANOID)["payload_hour"])
+    assert first < float(found.conflict.misses[0].rpartition(" ")[2]) - 1 < 0
+
+
 def test_equal_seeds_give_equal_solutions() -> None:
     first, again, other = (solve(BEAR, ["mass <= 100"], seed=seed) for seed in (0, 0, 1))
     assert first.moved == again.moved
@@ -175,6 +184,16 @@ def test_the_command_saves_a_design_with_the_reasons(command: Command, tmp_path:
         "nothing was changed" in command('solve bear "mass <= 200" --out', tmp_path / "no.yaml").out
     )
     assert not (tmp_path / "no.yaml").exists()
+
+
+def test_the_command_replaces_only_what_it_wrote(command: Command, tmp_path: Path) -> None:
+    file, line = tmp_path / "mine.yaml", 'solve bear "mass <= 100" --out'
+    file.write_text("values: {thigh_length: 0.3}\n", encoding="utf-8")
+    assert "was not written by this command; it is kept" in command.refuses(line, file)
+    assert file.read_text(encoding="utf-8") == "values: {thigh_length: 0.3}\n"
+    for _ in range(2):
+        command(line, tmp_path / "other.yaml")
+    assert "does not end in .yaml" in command.refuses(line, tmp_path / "other.txt")
 
 
 def test_the_command_names_what_excludes_each_other(command: Command, tmp_path: Path) -> None:

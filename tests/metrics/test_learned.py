@@ -62,7 +62,7 @@ def test_learned_metrics_are_found_by_name_and_are_no_part_of_the_others() -> No
         (lambda d: metrics.find("learned.speed"), "did you mean 'learned.top_speed'"),
         (
             lambda d: draft.screen(
-                d, vary={"thigh_length": THIGHS}, out="x", metrics=["learned.kick"]
+                d, vary={"thigh_length": THIGHS}, out="x.parquet", metrics=["learned.kick"]
             ),
             "'learned.kick' needs a policy",
         ),

@@ -23,6 +23,7 @@ from draft.errors import DraftError
 from draft.explore.comparison import titles
 from draft.extras import own_version
 from draft.learn.policy.reduced import open_any
+from draft.learn.policy.validity import check_used
 from draft.plotting import COLORS
 from draft.serving import messages
 from draft.spec import Spec
@@ -82,11 +83,17 @@ def page(
         cause = f"a page shows no skill '{skill}': its ground is a plane"
         raise DraftError(cause, f"skills: {', '.join(SKILLS)}")
     _check_designer(live, python, single, len(policies) > 0)
+    target = Path(out if out is not None else "page.html" if single else "page")
+    if single:
+        files.check_output(target, ".html")
+    else:
+        _check_folder(target)
     engine()
     opened = open_designs(given)
     _check(opened)
     own = [open_any(file) for file in policies]
     models = [compiled(design) for design in opened]
+    check_used(models, own)
     varied = [grid(model, vary, skill, own) for model in models] if len(vary) else []
     by = [one.by for one in varied] or [driven([model], skill, own) for model in models]
     rows = zip(models, titles(opened), COLORS, by, strict=False)  # There are more colours.
@@ -99,11 +106,9 @@ def page(
     if python:
         designer |= {"skill": skill, **pyodide.settings()}
     contents = _contents(robots, varied, single, designer)
-    target = Path(out if out is not None else "page.html" if single else "page")
     if single:
         files.write(target, contents["index.html"])
         return [target]
-    _check_folder(target)
     with files.new_folder(target, _REMEDY) as folder:
         for name, content in contents.items():
             (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)

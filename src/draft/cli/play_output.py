@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.errors import DraftError
 from draft.extras import need
+from draft.files import check_output
 from draft.serving.addresses import address, check_free, check_port
 from draft.serving.guard import check_address
 
@@ -110,10 +111,10 @@ def output(
         raise DraftError("--onnx takes one file", f"not {' '.join(onnx)}")
     policy = None
     if onnx is not None:
-        policy = _file(onnx[0] if onnx else str(default_onnx), ".onnx", "--onnx")
+        policy = check_output(onnx[0] if onnx else str(default_onnx), ".onnx", "--onnx")
     found = Output(
-        video=_file(video or str(default_video), ".mp4", "--out"),
-        strip=None if strip is None else _file(strip, ".png", "--strip"),
+        video=check_output(video or str(default_video), ".mp4", "--out"),
+        strip=None if strip is None else check_output(strip, ".png", "--strip"),
         onnx=policy,
         web=web,
         films=not web and (onnx is None or video is not None or strip is not None),
@@ -126,27 +127,6 @@ def output(
         check_address(host, token)
         check_free(host, port)
     return found
-
-
-def _file(name: str, suffix: str, option: str) -> Path:
-    """Check a file before work starts.
-
-    Raises:
-        DraftError: it cannot be written.
-    """
-    path = Path(name)
-    if path.suffix.lower() != suffix:
-        cause = f"{option} '{name}' does not end in {suffix}"
-        raise DraftError(cause, f"such as walk{suffix}")
-    if path.is_dir():
-        raise DraftError(f"{option} '{name}' is a folder", "name a file in it")
-    for parent in path.absolute().parents:
-        if parent.is_dir():
-            break
-        if parent.exists():
-            cause = f"{option} '{name}': {parent} is not a folder"
-            raise DraftError(cause, "choose another path")
-    return path
 
 
 def _summary(outcome: Outcome) -> str:

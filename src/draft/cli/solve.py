@@ -41,7 +41,7 @@ def main(
     ] = (),
     /,
     *,
-    vary: x.Vary = (),
+    vary: x.VaryAny = (),
     keep: Annotated[
         tuple[str, ...],
         tyro.conf.arg(
@@ -75,9 +75,12 @@ def main(
     nearest that the predictions from the former ones find; about a minute.
     """
     from draft import files
+    from draft.explore.nearest import MARK
     from draft.explore.solve import solve
 
     resolved, _ = open_design(reference, design, values, payload)
+    name = out or f"out/{resolved.reference.replace(':', '-')}-solved.yaml"
+    file = files.check_output(name, ".yaml", mark=MARK)
     learned = any(PREFIX in text for text in conditions)
     if learned:
         x.print_policy(rolled.policy, resolved)
@@ -94,10 +97,8 @@ def main(
             policy=rolled.policy,
             progress=progress,
         )
-    path = None
-    if found.conflict is None and found.moved:
-        name = resolved.reference.replace(":", "-")
-        path = out or Path(f"out/{name}-solved.yaml")
+    path = file if found.conflict is None and found.moved else None
+    if path is not None:
         files.write(path, found.design_file(resolved, conditions))
     if json:
         record = found.record() | {"file": None if path is None else str(path)}

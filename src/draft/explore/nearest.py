@@ -25,6 +25,7 @@ from draft.variation.axes import Axis
 _FIRST, _EACH = 8192, 2048  # Designs of the first look, and of each round.
 _FEWER = 32  # This many times fewer where a metric takes thousands of poses of each design.
 _ROUNDS, _SHRINK = 24, 0.72
+MARK = "Nearest to"  # Begins the description of a design file that a search wrote.
 _BEST = 8  # Solutions that a round searches around.
 _TIDY = 1.01  # A change may grow by this for fewer numbers that change.
 _LARGER = np.array([1.0, 1.0003, 1.001, 1.003, 1.01, 1.03])
@@ -100,7 +101,7 @@ class Solution:
 
     def design_file(self, start: Design, conditions: Sequence[str]) -> str:
         """Text of the design file: the values, and above them why each number moved."""
-        doc = f"Nearest to {start.reference} with {', '.join(conditions)}."
+        doc = f"{MARK} {start.reference} with {', '.join(conditions)}."
         lines = []
         for one in self.moved:
             why = f"; else {'; '.join(one.why)}" if one.why else ""

@@ -17,6 +17,7 @@ from draft.explore.parquet_parts import Parts, Summary, about, check_same
 from draft.explore.rows import Part, Rows, Watch, Work, check_size, column, fill, total
 from draft.explore.settings import ScreenSettings
 from draft.extras import need
+from draft.files import check_output
 from draft.settings import takes
 from draft.values import Array
 
@@ -57,10 +58,7 @@ def screen(robot: Robot, settings: ScreenSettings) -> Rows:
         DraftError: an argument is invalid, the file belongs to another run, the disk is full, or
             the extra `explore` is not installed.
     """
-    out = Path(settings.out)
-    if not out.name or out.is_dir():
-        cause = f"`out` '{out}' is a folder"
-        raise DraftError(cause, "name a file, such as screen.parquet")
+    out = check_output(settings.out, ".parquet")
     job = make(robot, "screen", settings, CHUNK)
     engine = LocalEngine(min(settings.workers, job.parts))
     return Rows(out, **run_screen(job, out, engine, settings.watch(job.n)))

@@ -51,9 +51,11 @@ def write_report(
     found: Sequence[Subject], out: Path, figures: str | Path | None = None
 ) -> list[Path]:
     """Write the page, and the figures if they have a folder; errors as `report`."""
-    files.write(out, page(found))
-    if figures is None:
-        return [out]
-    from draft.reporting.figures import draw
+    files.check_output(out, ".html")
+    drawn = []
+    if figures is not None:
+        from draft.reporting.figures import draw
 
-    return [out, *draw(Path(figures), found)]
+        drawn = draw(Path(figures), found)
+    files.write(out, page(found))
+    return [out, *drawn]

@@ -71,10 +71,15 @@ def subjects(
         raise DraftError(cause, "use `draft.sweep` for many")
     if any(design.count is not None for design in designs):
         raise DraftError("a report is about single designs", "select one: design[0]")
-    found = []
+    models = [one.build() if one.accepted else _preview(one) for one in designs]
+    if policies:
+        from draft.learn.policy.validity import check_used  # reports without gaits do not need it
+
+        check_used([model for model in models if model is not None], policies)
+    found: list[Subject] = []
     few = walk and len(designs) <= MOST_LIVE and available()
-    for i, (design, title) in enumerate(zip(designs, titles(designs), strict=True)):
-        model = design.build() if design.accepted else _preview(design)
+    for i, (model, title) in enumerate(zip(models, titles(designs), strict=True)):
+        design = designs[i]
         values = of_model(model) if model is not None and design.accepted else of_design(design)
         metrics = {name: scalar(value) for name, value in values.items()}
         record = plain(report(design))

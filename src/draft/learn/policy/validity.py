@@ -153,6 +153,31 @@ def fits(
     return fitted
 
 
+def check_used(models: Sequence[Model], policies: Sequence[AnyPolicy]) -> None:
+    """Refuse a policy of one's own that drives none of some robots.
+
+    Raises:
+        DraftError: there is one; the message says why it does not drive the first robot.
+    """
+    for one in policies:
+        if isinstance(one, LegsPolicy):
+            continue
+        reasons = [reason for model in models if (reason := _misfit(one, model))]
+        if reasons and len(reasons) == len(models):
+            cause = f"the policy {one.file} drives no robot here: {reasons[0]}"
+            raise DraftError(cause, "omit it: a policy that ships walks where one drives the robot")
+
+
+def _misfit(policy: Policy, model: Model) -> str:
+    """Why a policy does not drive a robot; "" if it does."""
+    try:
+        robot = _Robot.of(model)
+    except DraftError as error:
+        return error.problems[0].cause
+    found = match(policy.joints, trained_structure(policy), robot.member.joints, robot.own)
+    return found if isinstance(found, str) else ""
+
+
 @dataclass(frozen=True)
 class _Robot:
     """A robot that is to be driven.
