@@ -66,6 +66,8 @@ def test_wrong_rows_are_reported_with_their_file_and_row(command: Command) -> No
     assert "perhaps grams, not kilograms" in out
     (doubt,) = command.json(f"trends check --catalogue {table}", code=1)["doubts"]
     assert (doubt["kind"], doubt["file"], doubt["line"]) == ("unit_slip", "extra.csv", 3)
+    out = command(f"trends fit --catalogue {table} --out doubted.json").out
+    assert "extra.csv:3: unit slip: M2: mass 450 kg, where such modules have about" in out
     table = _table("good", "blank")
     err = command(f"trends fit --catalogue {table} --out x.json", code=2).err
     assert "extra.csv:3: mass_kg of 'M3' is missing" in err

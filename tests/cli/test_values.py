@@ -15,6 +15,8 @@ SCREEN = "screen bear --vary thigh_length=0.2:0.3 --out s --n"
         ("show quadruped --payload ten", "--payload: expected a number, not 'ten'"),
         ("show quadruped --payload None", "--payload: expected a number, not 'None'"),
         ("play cheetah --kick hard", "--kick: expected a number, not 'hard'"),
+        ("play cheetah --command a b c", "--command: expected a number, not 'a'"),
+        ("play cheetah --command 1 2", "'--command'. Expected 3 values."),
         ("train cheetah --iterations 1.5", "--iterations: expected a whole number, not '1.5'"),
         *(
             (f"{SCREEN} {n}", f"--n: expected a whole number, not '{n}'")

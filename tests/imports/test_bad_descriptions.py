@@ -210,7 +210,7 @@ def test_an_out_that_cannot_be_is_refused(out: str, words: str) -> None:
 @pytest.mark.parametrize(
     ("file", "words"),
     [
-        ("folder.urdf", "folder.urdf: this is not a file"),
+        ("folder.urdf", "folder.urdf: this is a folder, not a file\n  name a file in it: a.urdf"),
         ("pipe.urdf", "pipe.urdf: this is not a file"),
         ("gone.urdf", "gone.urdf: file not found"),
         ("large.urdf", "large.urdf: file of 200.0 MB\n  a description may have up to 50 MB"),
@@ -220,6 +220,7 @@ def test_an_out_that_cannot_be_is_refused(out: str, words: str) -> None:
 )
 def test_a_file_that_cannot_be_read_is_refused(file: str, words: str) -> None:
     Path("folder.urdf").mkdir()
+    Path("folder.urdf/a.urdf").touch()
     os.mkfifo("pipe.urdf")
     Path("large.urdf").touch()
     os.truncate("large.urdf", 200_000_000)

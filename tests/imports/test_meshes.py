@@ -299,6 +299,16 @@ def test_of_two_files_that_a_name_may_mean_none_is_taken(tmp_path: Path) -> None
     assert mesh_paths.find("package://r/meshes/a.stl", tmp_path) == (None, False)
 
 
+def test_a_file_of_another_project_is_not_taken_for_its_name_alone(tmp_path: Path) -> None:
+    (tmp_path / "other/parts").mkdir(parents=True)
+    (tmp_path / "other/parts/a.stl").touch()
+    assert mesh_paths.find("shapes/a.stl", tmp_path) == (None, False)
+    found, _ = mesh_paths.find("package://r/parts/a.stl", tmp_path)
+    assert found == Path(os.path.realpath(tmp_path)) / "other/parts/a.stl"
+    (tmp_path / "meshes").mkdir()  # Now it is the folder of a robot.
+    assert mesh_paths.find("shapes/a.stl", tmp_path)[0] == found
+
+
 def test_a_link_that_leads_outside_finds_nothing(tmp_path: Path) -> None:
     (tmp_path / "secret").mkdir()
     (tmp_path / "secret/a.stl").touch()

@@ -197,7 +197,9 @@ def test_a_xacro_that_cannot_be_expanded_is_one_line() -> None:
     error = refusal("import", "bad.xacro")
     assert error.startswith("bad.xacro: the xacro cannot be expanded: ")
     assert "xacro FILE > robot.urdf" in error
-    assert refusal("import", "gone.xacro") == "gone.xacro: file not found\n"
+    assert refusal("import", "gone.xacro").startswith(
+        "gone.xacro: file not found\n  name a maker's"
+    )
 
 
 def test_no_package_of_robots_is_imported_for_a_file(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,7 +28,10 @@ def main(
             metavar="DIR", help="Folder of the controller; replaces one that Draft wrote there."
         ),
     ],
-    skill: ShippedSkill = None,
+    skill: Annotated[
+        ShippedSkill,
+        tyro.conf.arg(help_behavior_hint="(default: machine where it drives the robot, else walk)"),
+    ] = None,
     policy: Annotated[
         str | None,
         tyro.conf.arg(

@@ -35,6 +35,7 @@ _varied = partial(
 )
 Vary = Annotated[tuple[str, ...], _varied(help_behavior_hint="(required)")]
 VaryToo = Annotated[tuple[str, ...], _varied(help_behavior_hint="(default: none)")]
+VaryAny = Annotated[tuple[str, ...], _varied(help_behavior_hint="(default: all that are stated)")]
 OfMetrics = Annotated[
     tuple[str, ...],
     tyro.conf.arg(

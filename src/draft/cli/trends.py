@@ -6,7 +6,7 @@ import json as json_
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.table import Table
@@ -18,6 +18,9 @@ from draft.errors import counted
 from draft.fitting.printed import Figure
 from draft.laws.catalogue import FILE as SHIPPED
 from draft.laws.catalogue import Part, with_rows
+
+if TYPE_CHECKING:
+    from draft.fitting.actuators.check import Doubt
 
 Catalogue = Annotated[
     tuple[Path, ...],
@@ -41,11 +44,15 @@ def fit(
         ),
     ] = Path("trends.json"),
 ) -> int:
-    """Fit every law to the catalogue and write the file of coefficients."""
+    """Fit every law to the catalogue and write the file of coefficients.
+
+    Rows that 'draft trends check' doubts are printed and fitted.
+    """
     from draft.fitting.actuators import catalogue_refit as refit
     from draft.laws import actuators
 
     parts = _read(catalogue)
+    _print_doubts(_own_doubts(parts, catalogue))
     before = actuators.laws().trends
     made = refit.actuator_trends(parts)
     refit.write(out, made)
@@ -91,17 +98,13 @@ def check(catalogue: Catalogue = (), json: JsonOutput = False) -> int:
     from draft.fitting.actuators.check import check as doubts_of
 
     parts = _read(catalogue)
-    doubts = doubts_of(parts)
-    if catalogue:
-        doubts = [doubt for doubt in doubts if doubt.where.file != str(SHIPPED)]
+    doubts = _own_doubts(parts, catalogue) if catalogue else doubts_of(parts)
     unmarked = any(doubt.kind != "contradicted" for doubt in doubts)
     if json:
         record = {"modules": len(parts), "doubts": [doubt.record() for doubt in doubts]}
         print(json_.dumps(record, indent=2))
         return 1 if unmarked else 0
-    for doubt in doubts:
-        kind = doubt.kind.replace("_", " ")
-        print(f"{doubt.where}: {kind}: {doubt.name}: {doubt.text}\n  {doubt.remedy}")
+    _print_doubts(doubts)
     print(f"{counted(len(parts), 'module')}, {counted(len(doubts), 'doubt')}")
     return 1 if unmarked else 0
 
@@ -144,6 +147,20 @@ def _read(catalogue: Sequence[Path]) -> list[Part]:
     for problem in skipped:
         print(f"warning: {problem}", file=sys.stderr)
     return list(parts.values())
+
+
+def _own_doubts(parts: Sequence[Part], catalogue: Sequence[Path]) -> list[Doubt]:
+    """What is doubted of the rows of further tables."""
+    from draft.fitting.actuators.check import check as doubts_of
+
+    found = doubts_of(parts) if catalogue else []
+    return [doubt for doubt in found if doubt.where.file != str(SHIPPED)]
+
+
+def _print_doubts(doubts: Sequence[Doubt]) -> None:
+    for doubt in doubts:
+        kind = doubt.kind.replace("_", " ")
+        print(f"{doubt.where}: {kind}: {doubt.name}: {doubt.text}\n  {doubt.remedy}")
 
 
 def _table(*headings: str) -> Table:

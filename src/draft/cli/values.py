@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
@@ -28,6 +28,14 @@ def _rule(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
             is_instance=lambda value: value is None or isinstance(value, (int, float)),
             str_from_instance=lambda value: [str(value)],
         )
+    if get_origin(kind) is tuple and (count := _numbers(get_args(kind))):
+        return PrimitiveConstructorSpec(
+            nargs=count,
+            metavar=" ".join(["FLOAT"] * count),
+            instance_from_str=lambda words: tuple(_number(float)([word]) for word in words),
+            is_instance=lambda value: value is None or isinstance(value, tuple),
+            str_from_instance=lambda value: [str(number) for number in value or [None] * count],
+        )
     if get_origin(kind) is Literal:
         choices = tuple(map(str, get_args(kind)))
         return PrimitiveConstructorSpec(
@@ -39,6 +47,12 @@ def _rule(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
             choices=choices,
         )
     return None
+
+
+def _numbers(parts: tuple[Any, ...]) -> int:
+    """Count of numbers in a tuple of so many; 0 for any other one."""
+    kinds = {get_args(one)[0] if get_origin(one) is Annotated else one for one in parts}
+    return len(parts) if kinds == {float} else 0
 
 
 def _number(kind: type) -> Callable[[list[str]], int | float]:

@@ -87,7 +87,7 @@ class Package:
             return None
         wanted = [part.lower() for part in reversed(parts)]
         best: list[Path] = []
-        most = 0 if self._is_known else 1
+        most = 1 if self._is_known else 2  # Elsewhere a file's name is too little.
         for path in self._files.get(wanted[0], ()):
             own = [part.lower() for part in reversed(path.relative_to(self.top).parts)]
             same = sum(

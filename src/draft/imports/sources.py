@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from draft.extras import missing, need
 EXTRA = "robots"
 XACRO = ".xacro"
 DATA = "example-robot-data"
+_DESCRIPTION = "name a maker's URDF, MJCF or xacro file, or a robot: menagerie:unitree_go2"
 # Folders of example-robot-data are called after their robots, with one of these endings.
 ENDINGS = ("_simple_description", "_description", "_data")
 
@@ -48,16 +50,27 @@ def find_source(file: str | Path) -> Source:
             or `example-robot-data:ROBOT`.
 
     Raises:
-        DraftError: there is no such robot, its package is not installed or cannot download it, or
-            the xacro cannot be expanded.
+        DraftError: there is no such file or robot, its package is not installed or cannot download
+            it, or the xacro cannot be expanded.
     """
     package, colon, robot = str(file).partition(":")
     if not colon or package not in PACKAGES or Path(file).exists():
-        path = Path(file)
+        path = _checked(Path(file))
         return Source(path, path.stem) if path.suffix != XACRO else _expanded(path)
     if not robot:
         raise DraftError(f"'{file}' names no robot", f"such as {EXAMPLES[package]}")
     return PACKAGES[package](robot)
+
+
+def _checked(path: Path) -> Path:
+    """Path of a description, which exists and is no folder."""
+    if os.path.isdir(path):
+        held = sorted(one.name for one in path.iterdir() if one.suffix in (".urdf", ".xml", XACRO))
+        remedy = f"name a file in it: {', '.join(held[:9])}" if held else _DESCRIPTION
+        raise DraftError(Problem("this is a folder, not a file", Location(str(path)), remedy))
+    if not os.path.exists(path):
+        raise DraftError(Problem("file not found", Location(str(path)), _DESCRIPTION))
+    return path
 
 
 def _menagerie(robot: str) -> Source:
@@ -124,8 +137,6 @@ def _by_name(files: list[metadata.PackagePath]) -> dict[str, PurePath]:
 def _expanded(path: Path) -> Source:
     """Source of a xacro file, expanded."""
     name = path.name.removesuffix(XACRO).removesuffix(".urdf")
-    if not path.is_file():
-        raise DraftError(Problem("file not found", Location(str(path))))
     return Source(path, name, _xacro(path, {}))
 
 

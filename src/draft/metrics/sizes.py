@@ -36,13 +36,13 @@ def mass(design: Design) -> Value:
     better="less",
 )
 def mass_low(design: Design) -> Value:
-    """Lower end of the 90 % band of the mass of such a robot, once built [kg]."""
+    """Lower end of the 90 % band of the mass of such a robot, once built, to about 5 % [kg]."""
     return _band(design)[0]
 
 
 @metric(unit="kg", formula="as mass_low", source=_FLEISHMAN, better="less")
 def mass_high(design: Design) -> Value:
-    """Upper end of the 90 % band of the mass of such a robot, once built [kg]."""
+    """Upper end of the 90 % band of the mass of such a robot, once built, to about 5 % [kg]."""
     return _band(design)[1]
 
 
