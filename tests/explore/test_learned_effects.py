@@ -61,7 +61,9 @@ def test_equal_seeds_give_equal_effects(found: Sensitivity) -> None:
 
 def test_the_interval_holds_what_more_rollouts_measure(found: Sensitivity) -> None:
     many = effects(32, (TORQUE,))
-    assert found.low[0, 0] < many.step_up[0, 0] < found.high[0, 0]
+    halves = [(one.high[0, 0] - one.low[0, 0]) / 2 for one in (found, many)]
+    assert abs(found.step_up[0, 0] - many.step_up[0, 0]) < np.hypot(*halves)  # Both err.
+    assert halves[1] < halves[0]
 
 
 def test_bodies_of_a_batch_have_the_same_draws_whatever_the_others_are() -> None:
@@ -93,19 +95,20 @@ def test_draws_are_those_of_the_replica() -> None:
 
 
 def test_a_solution_is_confirmed_by_another_evaluation() -> None:
-    conditions = [f"{SPEED} >= 3.95", "mass <= 36"]
+    conditions = [f"{SPEED} >= 4.25", "mass <= 36"]
     vary = {TORQUE: (60.0, 110.0), "trunk_length": (0.4, 0.6)}
     solved = draft.solve(CHEETAH, conditions, vary)
     assert solved.conflict is None
     assert solved.moved[0].name == TORQUE
     other = of_policy(solved.design, [SPEED], replicas=32, seed=7)
-    assert float(np.asarray(other[SPEED])) >= 3.95
+    assert float(np.asarray(other[SPEED])) >= 4.25
     assert float(solved.design.mass) <= 36
 
 
 def test_the_command_says_what_chance_hides(command: Command) -> None:
     said = command(f"sensitivity cheetah --of {SPEED} --by {TORQUE} trunk_width --replicas 4").out
-    assert re.search(r"leg\.peak_torque +72 +\+10 N m +\+0\.\d+ \(\+0\.\d+\.\.\+0\.\d+\)", said)
+    up = r"\+0\.\d+ \(\+0\.\d+\.\.\+0\.\d+\)"
+    assert re.search(rf"leg\.peak_torque +72 +\+10 N m +~0 \| {up}", said)
     assert "no effect beyond chance: trunk_width" in said
     assert "with the same noise, starts and kicks" in said
 

@@ -18,7 +18,6 @@ from draft.errors import DraftError, counted, listed
 from draft.explore.settings import EffectSettings
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.measuring.evaluation_options import BodyRollOuts
-from draft.learn.measuring.learned_metrics import speeds
 from draft.learn.measuring.paired_metrics import Paired, paired
 from draft.learn.measuring.policies import Source, source_for
 from draft.values import Array, Value
@@ -142,14 +141,5 @@ def _notes(source: Source, found: Paired, names: Sequence[str], replicas: int) -
     outside = [] if text else [name for name, one in moved.items() if source.warning(one)]
     if outside:
         notes.append(f"outside the region of the policy after a step of: {listed(outside, 6)}")
-    counts = {
-        name: sum(level <= source.forward_for(one) for level in speeds(source))
-        for name, one in {"": base, **moved}.items()
-    }
-    if other := [name for name, count in counts.items() if count != counts[""]]:
-        notes.append(
-            "the training of the policy covers more or fewer of the commanded speeds, so that "
-            f"the top speed jumps, after a step of: {listed(other, 6)}"
-        )
     notes += [f"{labels[row - 1]}: {reason}" for row, reason in found.reasons.items() if row]
     return tuple(notes)

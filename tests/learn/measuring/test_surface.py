@@ -223,7 +223,7 @@ def test_the_page_draws_the_body_of_the_design_that_is_shown(
     faults: list[str] = []
     tab.on("pageerror", lambda error: faults.append(str(error)))
     tab.goto((tmp_path / "surface.html").as_uri())
-    tab.wait_for_function("window.draftRobot")
+    tab.wait_for_function("() => window.draftRobot")
     for i in (0, len(found.refusal) - 1):
         tab.evaluate(f"show({i})")
         own = preview(found.designs[i]).mujoco

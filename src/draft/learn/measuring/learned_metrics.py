@@ -40,7 +40,6 @@ LEAD = 1.2  # No robot runs faster than this times its command; 1.1 was measured
 SETTLE = 2 / 3  # Share of a roll-out that is not measured.
 MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
 _LIMITS = {"sum": "torque and speed"}
-_ROUNDED = 1e-6  # Relative error of a level.
 _UPPER = 0.95  # Quantile at the upper end of a 90 % interval.
 
 
@@ -74,8 +73,8 @@ NUMBERS = tuple(one.name for one in fields(Learned) if one.name not in ("limitin
 
 
 def speeds(source: Source) -> tuple[float, ...]:
-    """Commanded speeds up to `Source.forward` [m/s]."""
-    return tuple(round(source.forward * (i + 1) / SPEEDS, 2) for i in range(SPEEDS))
+    """Commanded speeds of a body of the policy's leg length, up to `Source.forward` [m/s]."""
+    return tuple(source.forward * (i + 1) / SPEEDS for i in range(SPEEDS))
 
 
 def measure(
@@ -140,7 +139,7 @@ def roll_outs(
         rollouts: numbers of the roll-outs.
         report: called with the bodies done and their number, after every step.
         tests: names of the skill tests.
-        common: see `Trial`; levels of speed that count for none of the bodies are omitted.
+        common: see `Trial`.
 
     Yields:
         Each body with a name of its own, and roll-outs with histograms that hold its own.
@@ -156,11 +155,7 @@ def roll_outs(
     check_family(members)
     # Most bodies are fastest at one of the upper commands, and need not show what they do at the
     # lower ones.
-    levels = speeds(source)
-    if common:
-        most = max(source.forward_for(member) for member in members) * (1 + _ROUNDED)
-        levels = tuple(level for level in levels if level <= most) or levels[:1]
-    below = min(SPEEDS // 2, len(levels) - 1)
+    levels, below = speeds(source), SPEEDS // 2
     lower = replace(SKILL_TESTS[SPEED], levels=levels[:below])
     upper = replace(SKILL_TESTS[SPEED], levels=levels[below:])
     first = tuple(
@@ -178,9 +173,10 @@ def roll_outs(
 
         task, count = replace(task_of(source.plan), members=own), rollouts.replicas * len(own)
         settle = SETTLE * rollouts.seconds
-        trial = Trial(
-            *(task, chosen, count, rollouts.seconds, settle), seed=rollouts.seed, common=common
-        )
+        # Each body is asked for the same shares of the fastest command of its size.
+        paces = tuple(source.forward_for(member) / source.forward for member in own)
+        random = {"seed": rollouts.seed, "common": common}
+        trial = Trial(task, chosen, count, rollouts.seconds, settle, **random, paces=paces)
         return evaluate(trial, policy, device, advance, engine=engine.name, threads=threads)
 
     block = max(1, MOST_WORLDS // (rollouts.replicas * sum(len(one.levels) for one in first)))
@@ -188,9 +184,13 @@ def roll_outs(
         own = joined(members[start : start + block])
         worlds, histograms = rolled_out(own, first, start)
         slow: tuple[LeggedRobot, ...] = ()
-        if upper in first and lower.levels:
-            enough = LEAD * lower.levels[-1]
-            slow = tuple(one for one in own if not _fastest(source, one, worlds) > enough)
+        if upper in first:
+            enough = LEAD * below / SPEEDS  # Of the fastest command.
+            slow = tuple(
+                one
+                for one in own
+                if not _fastest(source, one, worlds) > enough * source.forward_for(one)
+            )
         if slow:
             more, counts = rolled_out(slow, (lower,), start + len(own) - len(slow) + len(slow) // 2)
             worlds, histograms = worlds.with_rows(more), histograms.with_groups(counts)

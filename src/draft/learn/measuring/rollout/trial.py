@@ -14,7 +14,7 @@ from mjlab.managers.event_manager import EventTermCfg
 
 from draft.learn.bodies.payload import with_payload
 from draft.learn.measuring.conditions import with_conditions
-from draft.learn.measuring.levels import FORWARD_LEAST, STANDING, SkillTest
+from draft.learn.measuring.levels import FORWARD_LEAST, SPEED, STANDING, SkillTest
 from draft.learn.measuring.summary import Request
 from draft.learn.task.mdp.events import inertia_errors
 from draft.learn.task.world.task import Task
@@ -37,6 +37,8 @@ class Trial:
         seed: seed of everything random.
         common: whether all designs and levels have the same random numbers, by replica, and
             histograms are those of single roll-outs, in the order of the worlds.
+        paces: factors on the commanded speeds of the skill test `speed`, one for each member; ()
+            for the same commands.
         extra: events at the start, in addition to those of training, and before them.
     """
 
@@ -48,6 +50,7 @@ class Trial:
     published: bool = False
     seed: int = 0
     common: bool = False
+    paces: tuple[float, ...] = ()
     extra: Mapping[str, EventTermCfg] = field(default_factory=dict)
 
     @property
@@ -86,7 +89,9 @@ def layout(trial: Trial, tests: Sequence[SkillTest]) -> Layout:
     def of_levels(values: Sequence[str | float]) -> np.ndarray:
         return np.repeat(np.array(values), size)
 
-    command = of_levels([test.command(level) for test, level in levels])
+    paces = np.tile(np.array(trial.paces or [1.0] * len(names)), len(levels) * trial.each)
+    paces = np.where(of_levels([test.name == SPEED for test, _ in levels]), paces, 1.0)
+    command = of_levels([test.command(level) for test, level in levels]) * paces
     kept = np.ones(len(command), dtype=bool)
     if trial.published:
         drawn = np.random.default_rng(trial.seed).random((2, len(command)))
@@ -95,7 +100,7 @@ def layout(trial: Trial, tests: Sequence[SkillTest]) -> Layout:
         command = np.where(ahead, np.maximum(command, FORWARD_LEAST), command) * kept
     return Layout(
         test=of_levels([test.name for test, _ in levels]),
-        level=of_levels([level for _, level in levels]),
+        level=of_levels([level for _, level in levels]) * paces,
         member=np.tile(np.array(names), len(levels) * trial.each),
         replica=np.tile(np.repeat(np.arange(trial.each), len(names)), len(levels)),
         kept=kept,
