@@ -41,7 +41,7 @@ RESULTS = ROOT / "examples/results/real_robots"
 OWN = ROOT / "examples/results/own_policies"
 COMPARED = ("top_speed", "kick", "step_up", "walking_power", "cost_of_transport")
 OWNED = ("top_speed", "kick", "walking_power")
-LEAST, SHARE = 5, 0.9  # Robots that a band needs, and the share that it holds.
+LEAST, SHARE = 9, 0.9  # Robots that a band needs, and the share that it holds.
 
 
 def main(
@@ -49,6 +49,7 @@ def main(
     /,
     robots: Path = ROBOTS,
     policy: str | None = None,
+    out: Path = RESULTS,
     train: Path | None = None,
     seeds: int = 3,
     iterations: int = 150,
@@ -59,10 +60,14 @@ def main(
         keys: names of robots.
         robots: folder of their descriptions.
         policy: run or ONNX file; by default the one that Draft uses for their legs.
+        out: folder of the numbers; those of another policy need one of their own.
         train: folder for the runs of policies of their own.
         seeds: number of these for each robot.
         iterations: iterations of each.
     """
+    if policy is not None and out.resolve() == RESULTS:
+        cause = f"{RESULTS} holds what the policies that ship do, of which the bands follow"
+        raise DraftError(cause, "give another `out`")
     files = {key: file_of(robots, key) for key in keys}
     if train is not None:
         for seed in range(seeds):
@@ -72,8 +77,9 @@ def main(
     for key, file in files.items():
         print(key, file=sys.stderr)
         found = real_robot(file, key=key, policy=policy)
-        save(RESULTS / f"{key}.json", record(found) | {"causes": _caused(found, policy)})
-    save(BANDS, bands_of(records()))
+        save(out / f"{key}.json", record(found) | {"causes": _caused(found, policy)})
+    if out == RESULTS:
+        save(BANDS, bands_of(records()))
 
 
 def file_of(folder: Path, key: str) -> Path:
@@ -142,6 +148,9 @@ def _own(key: str, file: Path, folder: Path, seed: int, iterations: int) -> None
     known: dict[str, Any] = {"seeds": {}}
     if path.is_file():
         known = json.loads(path.read_text(encoding="utf-8"))
+    if known["seeds"] and known["iterations"] != iterations:
+        cause = f"{path} holds policies of {known['iterations']} iterations, not {iterations}"
+        raise DraftError(cause, "give `iterations` as there, or remove the file")
     if str(seed) in known["seeds"]:
         return
     print(key, seed, file=sys.stderr)

@@ -259,18 +259,32 @@ def machines(found: Mapping[str, Any], group: str) -> list[Mapping[str, Any]]:
     return [row for row in rows if group_of(row) == group]
 
 
+def share(
+    found: Mapping[str, Any],
+    group: str,
+    by: Callable[[Mapping[str, Any]], Mapping[str, Any]] = lambda row: row,
+) -> float | None:
+    """Share of the machines of a group that walk; None if there is none.
+
+    Args:
+        found: all results.
+        group: the group.
+        by: takes the numbers of a robot that count; by default those of the policy of all legs.
+    """
+    of = machines(found, group)
+    return sum(walks(by(row), AT[group]) for row in of) / len(of) if of else None
+
+
 def bars(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Shares of machines that walk, against their bars."""
     rows = []
     for group, at in AT.items():
         of = machines(found, group)
-        share = sum(walks(row, at) for row in of) / len(of) if of else None
         what = f"{len(of)} real {group}, walk at {at:g} sqrt(g L)"
-        rows.append(bar(what, share, WALK[group], "%"))
+        rows.append(bar(what, share(found, group), WALK[group], "%"))
         if any(FAMILY in row for row in of):
-            share = sum(walks(as_used(row), at) for row in of) / len(of)
             what = "the same, by the policy that Draft uses for their legs"
-            rows.append(bar(what, share, WALK[group], "%"))
+            rows.append(bar(what, share(found, group, as_used), WALK[group], "%"))
     return rows
 
 

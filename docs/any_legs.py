@@ -2,6 +2,7 @@
 
     python -m benchmarks.any_legs --out examples/results/any_legs.json    # five minutes
     python -m benchmarks.zero_shot --out examples/results/zero_shot.json  # the same
+    python -m benchmarks.zero_shot --velocity-noise 0.5 --out examples/results/zero_shot_noisy.json
     python -m benchmarks.looks --out examples/results/looks.json          # half a minute
     python -m docs.any_legs --pictures   # film strips of robots that walk, and the page
     python -m docs.any_legs              # the page alone
@@ -32,7 +33,7 @@ from draft.files import write  # noqa: E402
 from draft.learn.bodies.features import GRAVITY  # noqa: E402
 from draft.learn.bodies.legged import LeggedRobot  # noqa: E402
 from draft.learn.policy.playback import Playback, Scenario  # noqa: E402
-from draft.learn.policy.policy import ANY, Policy  # noqa: E402
+from draft.learn.policy.policy import ANY, FAMILY, Policy, open_policy  # noqa: E402
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
 from draft.twins.compare import Comparison, compare_twin  # noqa: E402
 from draft.validation.arms import by_maker  # noqa: E402
@@ -42,7 +43,8 @@ PAGE, IMAGES = ROOT / "docs/any-legs.md", ROOT / "docs/images/any_legs"
 UNSEEN = ROOT / "examples/results/any_legs.json"
 REAL = ROOT / "examples/results/zero_shot.json"
 LOOKS = ROOT / "examples/results/looks.json"
-RESULTS = (UNSEEN, REAL, LOOKS)
+NOISY = ROOT / "examples/results/zero_shot_noisy.json"
+RESULTS = (UNSEEN, REAL, LOOKS, NOISY)
 # Number of strips, time that a robot walks [s], and width of a strip [pixels].
 PICTURES, SECONDS, WIDTH = 12, 4.0, 720
 _MASSES = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
@@ -63,7 +65,7 @@ def main(
         policy: policy of all legs.
         only: robots of the strips; by default a dozen that walk.
     """
-    unseen, real, seen = (json.loads(file.read_text("utf-8")) for file in RESULTS)
+    unseen, real, seen, noisy = (json.loads(file.read_text("utf-8")) for file in RESULTS)
     if pictures:
         names = only or pictured(real)
         files = {entry.key: entry.file for entry in zero_shot.entries(robots)}
@@ -73,7 +75,7 @@ def main(
             old.unlink()
         for name in names:
             strip(legs, files[name], IMAGES / f"{name}.png")
-    write(PAGE, page(unseen, real, seen, drawn()))
+    write(PAGE, page(unseen, real, seen, noisy, drawn()))
     print(PAGE)
 
 
@@ -131,6 +133,7 @@ def page(
     unseen: Mapping[str, Any],
     real: Mapping[str, Any],
     seen: Mapping[str, Any],
+    noisy: Mapping[str, Any],
     images: Sequence[str],
 ) -> str:
     """The page.
@@ -139,12 +142,21 @@ def page(
         unseen: results of `benchmarks.any_legs`.
         real: results of `benchmarks.zero_shot`.
         seen: results of `benchmarks.looks`.
+        noisy: results of `benchmarks.zero_shot` with another noise.
         images: robots with film strips.
     """
     action = unseen["action"]
     words = {"ms": f"{action['ms']:.2g}", "joints": action["joints"], "push": PUSH}
     words["noise"] = unseen["policy"]["velocity_noise"]
+    words["family"] = open_policy(FAMILY).velocity_noise
+    words["noisy"] = noisy["velocity_noise"]
+    for name, (group, at) in zip(("four", "two"), zero_shot.AT.items(), strict=True):
+        of = zero_shot.machines(real, group)
+        up = sum(row["cases"][f"{at:g}"]["up"] for row in of) / len(of)
+        words[name] = number(up, "%")
+        words[f"noisy_{name}"] = number(zero_shot.share(noisy, group), "%")
     each = counted(unseen["replicas"], "roll-out")
+    bodies = sum(row["bodies"] for row in unseen["kinds"] if row["trained"])
     starts = real["replicas"]
     of_real = {"each": counted(starts, "roll-out"), "error": zero_shot.ERROR}
     of_real["up"] = f"{math.ceil(zero_shot.UP * starts - 1e-9)} of {starts}"
@@ -174,7 +186,7 @@ def page(
             "",
             "## Bodies that it was not trained with",
             "",
-            *text.BODIES.format(bodies=unseen["bodies"], each=each).splitlines(),
+            *text.BODIES.format(bodies=bodies, each=each).splitlines(),
             "",
             *_table(any_legs.COLUMNS, unseen["kinds"]),
             "",

@@ -24,8 +24,8 @@ of the twelve bodies of [learning](learning.md) most sink and roll over. Draft d
 policy of all quadrupeds."""
 INTRODUCTION = """\
 Draft ships one policy for robots of any legs: two, four or six of them, with three to six driven
-joints each. The shipped hexapod, biped and humanoid walk with it; of real robots, nine of ten
-quadrupeds stay up at half a sqrt(g L), and three of five bipeds and humanoids at a quarter. It
+joints each. The shipped hexapod, biped and humanoid walk with it; real quadrupeds stay up in {four}
+of their roll-outs at half a sqrt(g L), and real bipeds and humanoids in {two} at a quarter. It
 observes and moves joints by their place, which is the side, the order from the front and the role
 in the leg, and is told torques, speeds, inertias, lengths and the centre of mass of the body, all
 without units. For one robot that is an ordinary small network of its own joints, which NumPy runs
@@ -40,9 +40,11 @@ region of validity, it takes the nearest numbers that it knows, says so and trie
 
 In this page velocities are per sqrt(g L) and rates of turn per sqrt(g / L), with the leg length L.
 Roll-outs last {seconds:g} s from noisy starts, with the delays and the noise of the training: the
-velocity that the policy observes errs by up to {noise:g} m/s. With 0.5 m/s (`--velocity-noise 0.5`)
-84 % of the real quadrupeds walk too, and 29 % of the bipeds and humanoids. An error is the mean
-distance of the trunk's velocity from the command, over time and over the roll-outs that stay up.
+velocity that the policy observes errs by up to {noise:g} m/s, and that of the policy of all
+quadrupeds by up to {family:g} m/s. With {noisy:g} m/s (`--velocity-noise {noisy:g}`), {noisy_four}
+of the real quadrupeds walk by the policy of all legs and {noisy_two} of the bipeds and humanoids.
+An error is the mean distance of the trunk's velocity from the command, over time and over the
+roll-outs that stay up.
 Pushes change the velocity by up to {push:g} sqrt(g L) along x and along y, three times."""
 TRIM = """\
 A policy that meets a robot for the first time misses its commands by a constant: a robot that
@@ -65,7 +67,7 @@ command. A robot walks if {up} of them stay up and the error is at most {error:g
 is that of the joints at the fastest command at which half stay up: the 95th percentile of torque or
 of speed over its limit, or of the sum of both, which is 1 on the torque-speed line. Outside: the
 largest distance of a number of the robot from those of the training, per the width of their range.
-Names that begin with `twin` are further files of machines that are listed already and count once.
+Names with `twin` or `vendor` are further files of machines that are listed and count once.
 Written by `python -m benchmarks.zero_shot`."""
 SEEN = """\
 Bodies of the generator, drawn with a third seed, walk at half of their fastest command in plain

@@ -2,7 +2,8 @@
 
 Speeds are measured at commands that the policy was trained with, over the last two thirds of a
 roll-out. Intervals are those of a bootstrap over the roll-outs, from 5 to 95 %: they say how sure
-the measurement is, not how right the model.
+the measurement is, not how right the model. A sample in which too few stay up, or that climbs no
+step, counts as zero for what a robot can reach.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from draft.learn.measuring.energy import add_energy, electronics_power, supply
 from draft.learn.measuring.evaluation_options import Extras
 from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SKILL_TESTS, SPEED, SkillTest
 from draft.learn.measuring.policies import Source
-from draft.learn.measuring.scalars import Worlds, curves, scalars
+from draft.learn.measuring.scalars import SURVIVAL, Worlds, curves, scalars
 from draft.metrics.leaping import push_off_of
 from draft.validation.standing import standing
 from draft.values import scalar
@@ -153,6 +154,7 @@ def measured(
     return found
 
 
+_REACHED = ("top_speed", "kick", "step_up", "step_down")
 _WHY = {"step_up": "it climbs no step", "step_down": "it descends no step"}
 
 
@@ -172,10 +174,11 @@ def _numbers(worlds: Worlds, member: LeggedRobot, walking: float) -> dict[str, f
     speed = by_test[SPEED]
     at = speed["levels"].index(walking)
     power = (speed.get("power") or [None])[at]
-    walks = (speed.get("endurance") or [None])[at] is not None and power is not None
+    stays = speed["survival"][at] >= SURVIVAL
+    walks = stays and (speed.get("endurance") or [None])[at] is not None and power is not None
     found["walking_speed"] = speed["speed"][at] if walks else None
     found["walking_power"] = electronics_power(member) + power if walks and power else None
-    return found | {name: (speed.get(name) or [None])[at] for name in ENERGY}
+    return found | {name: (speed.get(name) or [None])[at] if stays else None for name in ENERGY}
 
 
 def _resampled(
@@ -191,6 +194,6 @@ def _resampled(
         rows = np.concatenate([rng.choice(own, len(own)) for own in groups.values()])
         for name, value in _numbers(worlds.of(rows), member, walking).items():
             found = drawn.setdefault(name, [])
-            if value is not None:
-                found.append(value)
+            if value is not None or name in _REACHED:
+                found.append(value or 0.0)
     return drawn

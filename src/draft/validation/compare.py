@@ -114,7 +114,8 @@ def real_robot(
         if train is not None:
             told = partial(_learnt, report, arm)
             folder = Path(train) / f"{key}-{arm}"
-            chosen = {"family": source is not None, "seed": seed, "iterations": iterations}
+            family = source is not None and not source.of_any_legs
+            chosen = {"family": family, "seed": seed, "iterations": iterations}
             own = own_policy(member, folder, **chosen, report=told)
         if own is None:
             continue

@@ -85,15 +85,15 @@ def verdicts(key: str, leg_length: float, found: dict[str, Estimate]) -> list[Ve
 
 
 def walking_power(key: str) -> tuple[Figure, float] | None:
-    """Published mean power of a walking robot [W]: stated, or battery over endurance."""
+    """Published mean power of a walking robot [W]: stated, or battery over its endurance."""
     stated = of_robot(key, "walking_power")
     if stated:
         return stated[0], stated[0].high
     batteries, times = of_robot(key, "battery_energy"), of_robot(key, "endurance")
-    walking = [one for one in times if "not stated" not in one.condition]
-    if not batteries or not times:
+    walking = [one for one in times if one.condition.startswith("walking")]
+    if not batteries or not walking:
         return None
-    figure = (walking or list(times))[0]
+    figure = walking[0]
     # A longer time is less power.
     figure = replace(figure, bound=_OTHER_WAY[figure.bound])
     return figure, batteries[0].high / math.sqrt(figure.low * figure.high)

@@ -45,6 +45,7 @@ _ALONE = "train a policy for this robot alone: 'draft train'"
 _STRAIGHT = 0.02  # Angle of a knee below which a leg counts as straight [rad].
 # A joint of a left leg counts as positive about an axis with a positive part along this.
 _POSITIVE = np.array([1.0, 0.8, 0.5])
+_LEANING = 0.4  # Vertical part of the axis of a yaw joint on a leg that leans far.
 
 
 @dataclass(frozen=True)
@@ -191,6 +192,11 @@ class _Pose:
         joints = list(self.member.leg_joints[leg])
         return knee_of(np.array([*self.anchors[joints], self.feet[leg]]), self.axes[joints])
 
+    def roles(self, leg: int) -> list[int]:
+        """Role of each joint of a leg, from the trunk outwards."""
+        joints = self.member.leg_joints[leg]
+        return _roles(self.member, self.axes[list(joints)], self.knee(leg)[0], joints)
+
     def slots(self) -> Slots:
         member = self.member
         if member.rolls:
@@ -205,8 +211,7 @@ class _Pose:
             for order, leg in enumerate(side):
                 legs[leg] = 2 * _row(order, len(side)) + (not left)
         for leg, of_leg in enumerate(member.leg_joints):
-            chosen = _roles(member, self.axes[list(of_leg)], self.knee(leg)[0], of_leg)
-            for joint, role in zip(of_leg, chosen, strict=True):
+            for joint, role in zip(of_leg, self.roles(leg), strict=True):
                 joints[joint] = legs[leg] * len(ROLES) + role
         return Slots(tuple(joints), tuple(self.signs(by_knees=True)), tuple(legs))
 
@@ -222,9 +227,12 @@ class _Pose:
         for leg, of_leg in enumerate(member.leg_joints):
             if not self.left[leg]:
                 continue
-            for joint in of_leg:
-                signs[joint] = math.copysign(1.0, float(self.axes[joint] @ _POSITIVE))
             knee, angle = self.knee(leg)
+            for joint, role in zip(of_leg, self.roles(leg), strict=True):
+                axis = self.axes[joint]
+                # A yaw axis leans with the thigh, and its vertical part keeps its sign.
+                upright = role == _YAW and abs(axis[2]) > _LEANING
+                signs[joint] = math.copysign(1.0, axis[2] if upright else axis @ _POSITIVE)
             if by_knees and abs(angle) > _STRAIGHT:
                 signs[of_leg[knee]] = math.copysign(1.0, angle)
         for leg, of_leg in enumerate(member.leg_joints):

@@ -34,11 +34,14 @@ def commanded(run: Run, iteration: float = math.inf) -> float | None:
     """Largest |vx| that the policy of a run of stage `velocity` was commanded [m/s].
 
     Speeds that an exported policy of that stage, from which the run started, was commanded count
-    too: the run begins with slow ones again. None if none is recorded.
+    too, at the size of the run's robot: the run begins with slow ones again. None if none is
+    recorded.
     """
     origin, found = run.plan.origin, [fastest(run.folder / PROGRESS, iteration) or 0.0]
     file = origin.policy_file if origin is not None else None
     if file is not None and file.is_file():
-        policy = open_for(file, run.plan.members)
-        found.append(policy.forward if is_like(policy.stage, run.plan.stage) else 0.0)
+        policy, own = open_for(file, run.plan.members), run.plan.members
+        length = sum(member.leg_length for member in own) / len(own)
+        size = math.sqrt(length / policy.leg_length)  # Commands grow so with the leg length.
+        found.append(policy.forward * size if is_like(policy.stage, run.plan.stage) else 0.0)
     return max(found) or None
