@@ -279,6 +279,20 @@ def test_other_events_work_on_top_of_each_worlds_design(
     assert base[:3, trunk].numpy() == pytest.approx([m.body_mass[1] for m in models[:3]])
 
 
+def test_a_world_keeps_its_shift_of_the_centre_per_leg_length(
+    members: tuple[LeggedRobot, ...], models: list[Any]
+) -> None:
+    made = _env(members[:2], 2, config=Config())
+    trunk, giraffe = made.sim.mj_model.body("robot/trunk").id, 2
+    before = made.sim.model.body_ipos[0, trunk].numpy() - models[0].body_ipos[1]
+    redraw(made, torch.tensor([0]), [members[giraffe]])
+    after = made.sim.model.body_ipos[0, trunk].numpy() - models[giraffe].body_ipos[1]
+    assert np.abs(before).max() > 0
+    ratio = members[giraffe].scale / members[0].scale
+    assert ratio > 2
+    np.testing.assert_allclose(after, ratio * before, atol=1e-6)
+
+
 def test_designs_that_one_simulation_cannot_hold_are_refused(
     members: tuple[LeggedRobot, ...],
 ) -> None:

@@ -82,6 +82,22 @@ def test_robots_on_two_legs_begin_and_end_with_slower_commands(
     assert command.forward.value == pytest.approx(most)
 
 
+@pytest.mark.parametrize(
+    ("name", "ahead", "aside"), [("hexapod", 1.0, 1.0), ("humanoid", 0.2, 0.5)]
+)
+def test_pushes_of_robots_of_any_legs_are_as_large_for_their_size(
+    name: str, ahead: float, aside: float
+) -> None:
+    robot = legged_robot(draft.load(name).resolve())
+    task, p = made((robot,), "any", config=RECIPES["any"].config), RECIPES["any"].config.push
+    command: Any = task.commands["twist"]
+    assert command.pushed[1:3] == (Scaled(ahead * p.forward, 0.5), Scaled(aside * p.sideways, 0.5))
+    assert command.pushed.turn == Scaled(p.turn, -0.5)
+    strong = task.events["push"].params["kinds"][-1].most
+    assert strong[:3] == tuple(Scaled(value, 0.5) for value in p.linear)
+    assert strong[3:] == tuple(Scaled(value, -0.5) for value in p.angular)
+
+
 @pytest.mark.parametrize("stage", STAGES)
 def test_simulation_and_control_are_those_of_the_study(members: Any, stage: str) -> None:
     found = made(members, stage, seed=7)

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnvCfg
 
     from draft.learn.task.groups import Velocity
-    from draft.learn.task.mdp.commands import VelocityCommandCfg
+    from draft.learn.task.mdp.commands import Pushed, VelocityCommandCfg
+    from draft.learn.task.mdp.events import Kind
     from draft.learn.task.world.task import Task
 
 Change = Callable[["ManagerBasedRlEnvCfg", "Task"], None]
@@ -150,6 +151,11 @@ def any_legs(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
         first = command.growth.start
         start = Scaled(_FIRST_ON_TWO_LEGS * first.value, first.power)
         command.growth = command.growth._replace(start=start)
+    if command.pushed is not None:
+        command.pushed = command.pushed._replace(**_pushed_of_any(command.pushed, legs))
+        pushes = cfg.events["push"].params
+        *usual, strong = pushes["kinds"]
+        pushes["kinds"] = (*usual, _sized(strong))
     command.single = v.single
     if v.progress:
         gate = scaled(numbers, "clearance_gate")
@@ -167,6 +173,25 @@ def largest_of_any(numbers: Velocity, legs: int) -> tuple[Scaled, Scaled, Scaled
     ahead, aside = _ON_TWO_LEGS if legs == 2 else (1.0, 1.0)
     forward, sideways = Scaled(ahead * numbers.forward, 0.5), Scaled(aside * numbers.sideways, 0.5)
     return forward, sideways, Scaled(numbers.turn, -0.5)
+
+
+def _pushed_of_any(pushed: Pushed, legs: int) -> dict[str, Scaled]:
+    """Largest commands of pushed robots of any size: as fast for their size, slower on two legs."""
+    ahead, aside = _ON_TWO_LEGS if legs == 2 else (1.0, 1.0)
+    return {
+        "forward": Scaled(ahead * pushed.forward.value, 0.5),
+        "sideways": Scaled(aside * pushed.sideways.value, 0.5),
+        "turn": Scaled(pushed.turn.value, -0.5),
+    }
+
+
+def _sized(kind: Kind) -> Kind:
+    """Pushes as large for the size of each robot as they are for a leg of 0.48 m."""
+    most = kind.most
+    powers = (*[0.5] * (len(most) // 2), *[-0.5] * (len(most) // 2))
+    return kind._replace(
+        most=tuple(Scaled(one.value, power) for one, power in zip(most, powers, strict=True))
+    )
 
 
 def terrain(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:

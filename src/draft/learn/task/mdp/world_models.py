@@ -57,8 +57,8 @@ def assume_designs(env: ManagerBasedRlEnv, env_ids: torch.Tensor | None) -> None
 def redraw(env: ManagerBasedRlEnv, worlds: torch.Tensor, members: Sequence[LeggedRobot]) -> None:
     """Give some worlds other designs, without a compile of the scene; reset these worlds after it.
 
-    Shifts of the trunk's centre of mass and friction that were drawn for a world stay; inertia
-    errors do not. `Robot.member` still tells which design a world began with.
+    Friction that was drawn for a world stays, and so does the shift of the trunk's centre of mass
+    per leg length; inertia errors do not. `Robot.member` still tells which design a world began with.
 
     Args:
         env: the environment of a family, on any engine.
@@ -83,6 +83,8 @@ def redraw(env: ManagerBasedRlEnv, worlds: torch.Tensor, members: Sequence[Legge
     check_family([first, *members])
     model: Any = env.sim.model  # mjlab's bridge of Warp arrays has no types.
     shift = model.body_ipos[worlds] - env.sim.default_model_fields[_CENTRE][worlds]
+    scales = torch.tensor([member.scale for member in members], device=env.device)
+    shift = shift * (scales / robot.leg_scale[worlds])[:, None, None]
     # The scene has the meshes of the first design, from which the numbers are found.
     places = torch.arange(1, len(members) + 1, device=env.device)
     _write(env, (first, *members), worlds, places)
