@@ -39,11 +39,19 @@ def test_a_speed_below_that_of_walking_is_a_claim_on_a_product() -> None:
 
 
 @pytest.mark.parametrize(
-    ("watts", "word"), [(43, "outside"), (44, "within"), (97, "within"), (98, "outside")]
+    ("watts", "word"), [(166, "outside"), (167, "within"), (374, "within"), (376, "outside")]
 )
 def test_energy_is_right_within_a_factor(watts: float, word: str) -> None:
-    # CyberDog 2: 97.2 Wh over 1.5 h.
-    assert judged("xiaomi_cyberdog2", walking_power=watts)["walking_power"] == word
+    # X2 Ultra: 500 Wh over 2 h of walking.
+    assert judged("agibot_x2_ultra", walking_power=watts)["walking_power"] == word
+
+
+def test_a_time_that_is_not_of_walking_is_no_power_of_a_walk() -> None:
+    # CyberDog 2: a mix of lying, standing and walking; H1: of what is not stated.
+    for key in ("xiaomi_cyberdog2", "h1"):
+        assert of_robot(key, "battery_energy")
+        assert of_robot(key, "endurance")
+        assert walking_power(key) is None
 
 
 @pytest.mark.parametrize(("watts", "word"), [(100, "within"), (674, "within"), (676, "outside")])

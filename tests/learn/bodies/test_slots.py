@@ -200,6 +200,20 @@ def test_a_positive_knee_bends_further_whichever_way_it_bends() -> None:
     assert min(bends) < 0 < max(bends)
 
 
+def test_yaw_joints_that_lean_with_the_thigh_have_one_sign() -> None:
+    members = generate_kind("biped_slanting", 24).members
+    leaning = []
+    for member in members:
+        model = model_spec(member).compile()
+        data = mujoco.MjData(model)
+        pose.put(model, data, member.home)
+        axis = data.xaxis[model.joint("left_hip_yaw").id]
+        sign = slots_of(member).signs[member.joints.index("left_hip_yaw")]
+        assert sign * axis[2] > 0
+        leaning.append(sign * axis @ (1.0, 0.8, 0.5))
+    assert min(leaning) < 0 < max(leaning)  # Some lean so far that another rule parts them.
+
+
 @pytest.mark.parametrize("name", ["cheetah", "humanoid", "hexapod"])
 def test_the_numbers_of_a_body_are_read_back_in_their_units(name: str) -> None:
     member = legged_robot(draft.load("quadruped" if name == "cheetah" else name).resolve())

@@ -58,7 +58,8 @@ def redraw(env: ManagerBasedRlEnv, worlds: torch.Tensor, members: Sequence[Legge
     """Give some worlds other designs, without a compile of the scene; reset these worlds after it.
 
     Friction that was drawn for a world stays, and so does the shift of the trunk's centre of mass
-    per leg length; inertia errors do not. `Robot.member` still tells which design a world began with.
+    per leg length; inertia errors do not. `Robot.member` still tells which design a world began
+    with.
 
     Args:
         env: the environment of a family, on any engine.
