@@ -68,7 +68,9 @@ def test_each_sensitivity_study_changes_one_choice_of_the_study_of_three() -> No
     physics = replace(of_three.config.physics, timestep=0.001, decimation=20)
     assert fine.config == replace(of_three.config, physics=physics)
     assert 2 * of_three.iterations("base") == twice.iterations("base")
-    assert all(one.designs == of_three.designs for one in (paper, fine, twice))
+    start = read(EXAMPLES / "sensitivity/from_family.yaml")
+    assert (start.stages, start.config) == (("velocity",), RECIPES["tune"].config)
+    assert all(one.designs == of_three.designs for one in (paper, fine, twice, start))
 
 
 def test_numbers_of_the_tasks_and_a_ground_are_those_of_all_stages() -> None:
