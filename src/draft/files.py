@@ -83,14 +83,18 @@ def check_output(name: str | Path, suffix: str, option: str = "`out`", mark: str
             command has not written.
     """
     path = Path(name)
-    if str(name) and path.is_dir():
+    if str(name) and os.path.isdir(path):
         raise DraftError(f"{option} '{name}' is a folder", f"name a file in it: FILE{suffix}")
     if path.suffix.lower() != suffix:
         example = f"{path.stem or 'name'}{suffix}"
         raise DraftError(f"{option} '{name}' does not end in {suffix}", f"such as {example}")
-    if path.exists() and mark and mark.encode() not in path.read_bytes():
-        cause = f"'{path}' exists and was not written by this command; it is kept"
-        raise DraftError(cause, f"choose another {option}")
+    if mark and os.path.exists(path):
+        own = False
+        with suppress(OSError):
+            own = mark.encode() in path.read_bytes()
+        if not own:
+            cause = f"'{path}' exists and was not written by this command; it is kept"
+            raise DraftError(cause, f"choose another {option}")
     for parent in path.absolute().parents:
         if parent.is_dir():
             break

@@ -65,7 +65,9 @@ def find_source(file: str | Path) -> Source:
 def _checked(path: Path) -> Path:
     """Path of a description, which exists and is no folder."""
     if os.path.isdir(path):
-        held = sorted(one.name for one in path.iterdir() if one.suffix in (".urdf", ".xml", XACRO))
+        held: list[str] = []
+        with contextlib.suppress(OSError):
+            held = sorted(one for one in os.listdir(path) if one.endswith((".urdf", ".xml", XACRO)))
         remedy = f"name a file in it: {', '.join(held[:9])}" if held else _DESCRIPTION
         raise DraftError(Problem("this is a folder, not a file", Location(str(path)), remedy))
     if not os.path.exists(path):
