@@ -403,7 +403,7 @@ WORDS = {
             "--vary",
             VARIED,
             "--out",
-            "out",
+            "out.parquet",
         ),
     ),
     "metric_that_no_fixed_base_has": bolted(

@@ -18,7 +18,10 @@ def _choose_rendering(arguments: Sequence[str]) -> None:
     command = [*arguments[:1]]
     draws = command in (["twin"], ["import"], ["play"], ["mcp"]) or (
         [*arguments[:2]] == ["study", "report"]
-        or (command == ["report"] and "--figures" in (one.split("=")[0] for one in arguments))
+        or (
+            command == ["report"]
+            and any(one.lstrip("-").startswith("figures") for one in arguments)
+        )
     )
     if draws:
         prefer_offscreen()
