@@ -95,14 +95,18 @@ def test_searches_over_its_parameters_take_its_metrics(command: Command) -> None
     pytest.importorskip("pyarrow")
     vary = "--vary pedestal_mass=0:40 actuators.large.peak_torque=30:200"
     screen = command.json(
-        f"screen bench_arm {vary} --n 64 --where 'accepted and mass < 18' --out s"
+        f"screen bench_arm {vary} --n 64 --where 'accepted and mass < 18' --out s.parquet"
     )
     assert 0 < screen["rows"] < 64
     where = "--where 'reach > 0.9 and payload_peak > 5'"
-    few = command.json(f"screen bench_arm {vary} forearm_length=0.2:0.6 --n 64 {where} --out u")
+    few = command.json(
+        f"screen bench_arm {vary} forearm_length=0.2:0.6 --n 64 {where} --out u.parquet"
+    )
     assert 0 < few["rows"] < 64
     vary_hand = "--vary actuators.servo.peak_torque=1:3"
-    few = command.json(f"screen bench_hand {vary_hand} --n 16 --where 'pinch_force > 37' --out v")
+    few = command.json(
+        f"screen bench_hand {vary_hand} --n 16 --where 'pinch_force > 37' --out v.parquet"
+    )
     assert 0 < few["rows"] < 16
     assert command.json(f"sweep bench_arm {vary} --n 4 --out t")["designs"] == 4
     command(f"optimise bench_arm {vary} --minimise mass --maximise payload_peak --trials 8 --out o")

@@ -274,7 +274,8 @@ def test_the_command_prints_one_object_or_says_what_a_grid_became(command: Comma
         ("screen --workers 0", "--workers 0 is not a whole number from 1 to 1024"),
         ("screen --metrics masss_", "there is no metric 'masss_'"),
         ("screen --out robot", "--out 'robot' is a folder"),
-        ("screen --out robot/tree.yaml", "was not written by 'draft screen'; it is kept"),
+        ("screen --out robot/tree.yaml", "--out 'robot/tree.yaml' does not end in .parquet"),
+        ("screen --out robot/own.parquet", "was not written by 'draft screen'; it is kept"),
         ("screen --set thigh_length=0.3", "is given by --set and by --vary"),
         ("screen --set shank_length=9", "shank_length = 9 m is outside its range [0.1, 0.6]"),
         ("screen --design lang", "did you mean 'long'?"),
@@ -290,6 +291,7 @@ def test_the_command_prints_one_object_or_says_what_a_grid_became(command: Comma
 def test_every_mistake_is_said_and_nothing_is_written(
     words: str, message: str, command: Command
 ) -> None:
+    Path("robot/own.parquet").touch()
     before = sorted(Path().rglob("*"))
     word, *more = shlex.split(words)
     given_ = f"{word} robot --vary thigh_length=0.2:0.5 --out s.parquet"
