@@ -156,6 +156,7 @@ def page(
         words[name] = number(up, "%")
         words[f"noisy_{name}"] = number(zero_shot.share(noisy, group), "%")
     each = counted(unseen["replicas"], "roll-out")
+    walk = number(zero_shot.share(real, zero_shot.TWO), "%")
     bodies = sum(row["bodies"] for row in unseen["kinds"] if row["trained"])
     starts = real["replicas"]
     of_real = {"each": counted(starts, "roll-out"), "error": zero_shot.ERROR}
@@ -204,7 +205,7 @@ def page(
             *_pictures(images),
             "## What does not walk, and why",
             "",
-            *text.WHY.splitlines(),
+            *text.WHY.format(walk=walk).splitlines(),
             "",
             *_failures(real),
         )

@@ -19,8 +19,8 @@ as commands begin small again. What ships is the mean of the weights before and 
 bodies of validation (another seed) keeps most of both.
 
 In all of these trainings a hip yaw whose axis leans far with the thigh counted as turning the other
-way, in 8 % of the drawn bodies with slanting hips. In the policy that ships all turn one way: 68 %
-of the real bipeds and humanoids walk, where 50 % did.
+way, in 8 % of the drawn bodies with slanting hips. In the policy that ships all turn one way:
+{walk} of the real bipeds and humanoids walk, where 50 % did.
 
 Robots that fall lie outside the numbers of the training or near their ends, most by weak or slow
 ankles or slanting hips; but limx_oli_d04, n1 and icub lie inside and fall all the same. So do

@@ -16,14 +16,10 @@ def run() -> int:
 def _choose_rendering(arguments: Sequence[str]) -> None:
     """Choose how MuJoCo renders for a command, before it is imported."""
     command = [*arguments[:1]]
-    draws = command in (["twin"], ["import"], ["play"], ["mcp"]) or (
-        [*arguments[:2]] == ["study", "report"]
-        or (
-            command == ["report"]
-            and any(one.lstrip("-").startswith("figures") for one in arguments)
-        )
-    )
-    if draws:
+    draws = command in (["twin"], ["import"], ["play"], ["mcp"])
+    if command == ["report"]:
+        draws = any(one.lstrip("-").startswith("figures") for one in arguments)
+    if draws or [*arguments[:2]] == ["study", "report"]:
         prefer_offscreen()
     elif command not in (["view"], ["study"], ["doctor"]):
         # The workers of a study choose for themselves, and `doctor` reports the user's choice.

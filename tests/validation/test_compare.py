@@ -69,6 +69,23 @@ def test_a_humanoid_is_measured_with_the_policy_of_all_legs(tmp_path: Path) -> N
     assert not any(note.startswith("not measured by roll-outs") for note in found.notes)
 
 
+def test_a_robot_that_the_policy_of_all_legs_drives_learns_from_scratch(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+
+    def learnt(*_: object, family: bool, **__: object) -> None:
+        asked.append(family)
+        raise DraftError("asked", "")
+
+    monkeypatch.setattr("draft.validation.compare.own_policy", learnt)
+    robot = draft.export(draft.load("humanoid").resolve(), tmp_path) / "robot.urdf"
+    for file in (robot, GO2):
+        with pytest.raises(DraftError, match="asked"):
+            draft.real_robot(file, train=tmp_path, **QUICK)
+    assert asked == [False, True]
+
+
 def test_guessed_torques_are_told(tmp_path: Path) -> None:
     text = GO2.read_text(encoding="utf-8")
     (tmp_path / "odd.urdf").write_text(re.sub(r'effort="[^"]*"', 'effort="1000"', text))

@@ -77,6 +77,15 @@ def test_every_world_has_its_test_level_replica_and_member(family: Trial, flat: 
     assert names[flat.scene["robot"].member.numpy()].tolist() == rows.member.tolist()
 
 
+def test_members_may_be_asked_for_speeds_of_their_own(family: Trial) -> None:
+    own = replace(family, paces=(1.0, 1.5))
+    rows = layout(own, own.tests)
+    assert rows.command.tolist() == [0.0] * 4 + [3.0, 4.5] * 2 + [0.4] * 4
+    assert rows.level[rows.test == "speed"].tolist() == [3.0, 4.5] * 2
+    usual = layout(family, family.tests)
+    assert rows.level[rows.test == "push"].tolist() == usual.level[usual.test == "push"].tolist()
+
+
 def test_replicas_are_shared_out_among_members(members: Any) -> None:
     of = trial(members, levels("walk", 0.4), replicas=4)
     assert of.each == 2

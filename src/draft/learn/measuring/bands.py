@@ -19,9 +19,10 @@ from draft.metrics.capabilities import CAPABILITIES
 FILE = Path(__file__).with_name("mass_bands.json")
 # Capabilities of evaluations, and those of real robots that tell of them.
 _OF = {
-    **{"step": "step_up", "step_ascent": "step_up"},
-    # That of real robots is of a walk, where evaluations have one at top speed too.
-    **{"walk_cost_of_transport": "cost_of_transport", "cost_of_transport": ""},
+    "step": "step_up",
+    "step_ascent": "step_up",
+    "walk_cost_of_transport": "cost_of_transport",
+    "cost_of_transport": "",  # At top speed; that of real robots is of a walk.
 }
 
 
