@@ -55,6 +55,8 @@ def policy_file(
         action_scale=np.where(rolls, 4.5, 0.175),
         stiffness=np.where(rolls, 0.0, 1.43 * peak),
         damping=0.071 * peak,
+        servo_torque=peak,
+        support=0.0,
         peak_torque=peak,
         stall_torque=np.array(member.stall_torque),
         no_load_speed=np.array(member.no_load_speed),

@@ -27,8 +27,10 @@ from draft.learn.bodies.slots import (
     mirrored_features,
     mirrored_slots,
     readable_slots,
+    servo_torque,
     slot_features,
     slots_of,
+    traits,
 )
 from draft.model import pose
 
@@ -198,6 +200,48 @@ def test_a_positive_knee_bends_further_whichever_way_it_bends() -> None:
             assert lengths[1] < lengths[0]
             bends.append(own[len(OF_JOINT[:-1]) * SLOTS + slots.joints[knee]])
     assert min(bends) < 0 < max(bends)
+
+
+def test_gains_of_hip_pitch_and_knee_are_for_what_the_weight_asks_of_weak_motors() -> None:
+    member = ROBOTS["biped"]
+    slots = slots_of(member)
+    least = 0.6 * member.mass * 9.81 * member.leg_length
+    weak = replace(member, peak_torque=(0.5 * least,) * len(member.joints))
+    asked = [
+        least if slot >= 0 and ROLES[slot % len(ROLES)] in ("pitch", "knee") else 0.5 * least
+        for slot in slots.joints
+    ]
+    assert servo_torque(weak, slots, 0.6) == pytest.approx(np.array(asked))
+    assert {round(x / least, 3) for x in asked} == {0.5, 1.0}
+    strong = replace(member, peak_torque=(2 * least,) * len(member.joints))
+    assert servo_torque(strong, slots, 0.6).tolist() == list(strong.peak_torque)
+    assert servo_torque(weak, slots, 0.0).tolist() == list(weak.peak_torque)
+
+
+def test_traits_are_torque_width_over_height_speed_and_size() -> None:
+    """By a calculation of its own, from the model."""
+    for name in ("quadruped", "hexapod"):
+        member = ROBOTS[name]
+        (found,) = traits(np.array(slot_features([member])))
+        model = mujoco.MjModel.from_xml_string(member.xml)
+        data = mujoco.MjData(model)
+        pose.put(model, data, member.home)
+        mujoco.mj_comPos(model, data)
+        feet = np.array([data.site(name).xpos for name in member.feet])
+        centre = data.subtree_com[0]
+        hips = [leg[1] for leg in member.leg_joints]
+        torque = np.mean([member.peak_torque[j] for j in hips])
+        speed = np.mean([member.no_load_speed[j] for j in hips])
+        weight = 9.81 * member.mass * member.leg_length
+        assert found == pytest.approx(
+            [
+                np.log(torque / weight),
+                np.abs(feet[:, 1]).mean() / (centre[2] - feet[:, 2].mean()),
+                np.log(speed * np.sqrt(member.leg_length / 9.81)),
+                np.log(member.scale),
+            ],
+            rel=1e-6,
+        )
 
 
 def test_yaw_joints_that_lean_with_the_thigh_have_one_sign() -> None:

@@ -76,6 +76,12 @@ def place(
     env.scene.update(dt=0.0)
 
 
+def value(env: Any, name: str) -> torch.Tensor:
+    """What a reward term gives, before its weight."""
+    term = env.reward_manager.get_term_cfg(name)
+    return term.func(env, **term.params)
+
+
 def stand(env: Any, lift: float = 0.0, **state: Any) -> None:
     """Put every robot with its lowest foot `lift` [m] above flat ground."""
     height = env.scene["robot"].height + lift

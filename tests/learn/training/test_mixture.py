@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,19 +22,22 @@ from tensordict import TensorDict  # noqa: E402
 
 import draft  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.bodies.generated import generate  # noqa: E402
+from draft.learn.bodies.generated import generate, generate_kind  # noqa: E402
 from draft.learn.bodies.legged import LeggedRobot, by_topology, kind_of, legged_robot  # noqa: E402
 from draft.learn.bodies.slots import SLOTS, describe, slots_of  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.engine.worlds.simulate import make  # noqa: E402
+from draft.learn.engine.worlds.turns import alike, cells  # noqa: E402
 from draft.learn.measuring.rollout import review  # noqa: E402
 from draft.learn.measuring.rollout.by_slots import by_slots  # noqa: E402
 from draft.learn.policy import video  # noqa: E402
 from draft.learn.policy.playback import Outcome, Playback  # noqa: E402
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
+from draft.learn.task.mdp.commands import command_term  # noqa: E402
 from draft.learn.task.mdp.environment import environment  # noqa: E402
 from draft.learn.task.recipes import ANY  # noqa: E402
 from draft.learn.task.world.access import robot_of  # noqa: E402
+from draft.learn.task.world.robot import RobotCfg  # noqa: E402
 from draft.learn.task.world.task import Task  # noqa: E402
 from draft.learn.training.ppo.legs_onnx import export_legs  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
@@ -44,6 +48,7 @@ from tests.commands import Command  # noqa: E402
 from tests.learn.legs import mixed_plan  # noqa: E402
 from tests.learn.runs import begin, train, weights  # noqa: E402
 from tests.learn.small import SMALL  # noqa: E402
+from tests.learn.task.states import place, value  # noqa: E402
 
 if obstacle() is not None:
     pytest.skip("needs mjbatch", allow_module_level=True)
@@ -88,6 +93,50 @@ def test_worlds_are_divided_by_the_numbers_of_bodies() -> None:
         assert shares == pytest.approx(1.0, abs=0.1)
     assert by_bodies(10, [4, 2, 2, 1, 2], 2) == [2] * 5
     assert by_bodies(7, [3], 2) == [7]
+
+
+def test_a_fall_counts_as_the_rest_of_a_fast_command_not_followed(run: Run) -> None:
+    """A fall ends the episode, so that no later sample could tell that it was too fast."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        env = Worlds(run.plan, "cpu", "native", 0, 1).envs[0]
+    term: Any = command_term(env)
+    fallen, since = env.termination_manager._terminated_buf, term._since
+    term.pushed = None
+    for share, age, fell, counted in (
+        (0.9, 1.0, True, 3.0),
+        (0.5, 1.0, True, 0.0),
+        (0.9, 0.02, True, 0.0),
+        (0.9, 1.0, False, 0.0),
+    ):
+        term._reached.zero_()
+        speed = share * float(term.range_now()[0, 0])
+        fallen[0], since[0], term.time_left[0], term.vel_command_b[0, 0] = fell, age, 3.0, speed
+        term.reset(torch.tensor([0]))
+        steps = counted / env.step_dt
+        found = term._reached[term.group[0]].tolist()
+        assert found == pytest.approx([steps, steps * speed, 0.0])
+    env.close()
+
+
+def test_robots_of_all_legs_are_to_keep_the_height_of_their_home_pose(run: Run) -> None:
+    with contextlib.redirect_stdout(io.StringIO()):
+        worlds = Worlds(run.plan, "cpu", "native", 0, 1)
+    for env in worlds.envs:
+        robot = robot_of(env)
+        at = torch.zeros(env.num_envs, 3)
+        at[:, 2] = robot.height
+        place(env, at)
+        assert value(env, "height").tolist() == pytest.approx([1.0] * env.num_envs, abs=1e-3)
+    worlds.close()
+
+
+def test_cells_of_bodies_of_any_legs_part_them_by_torque_width_speed_and_size() -> None:
+    members = generate_kind("quadruped", 64, 3).members
+    by_slots: Any = SimpleNamespace(scene={"robot": SimpleNamespace(cfg=RobotCfg(by_slots=True))})
+    numbers = np.array(alike(by_slots, members))
+    found = cells(numbers, 16)
+    within = [numbers[found == cell].std(axis=0) for cell in range(16)]
+    assert (np.mean(within, axis=0) < 0.7 * numbers.std(axis=0)).all()
 
 
 def test_actions_of_absent_joints_are_not_learnt(run: Run) -> None:

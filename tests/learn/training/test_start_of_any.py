@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,16 +19,20 @@ pytest.importorskip("mjlab")
 from draft import learn  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
+from draft.learn.measuring.policies import config_of  # noqa: E402
 from draft.learn.measuring.rollout import review  # noqa: E402
-from draft.learn.policy.policy import ANY  # noqa: E402
+from draft.learn.policy.policy import ANY, open_policy  # noqa: E402
 from draft.learn.policy.reduced import open_legs_policy  # noqa: E402
+from draft.learn.task.world.access import robot_of  # noqa: E402
 from draft.learn.training.options import TrainOptions  # noqa: E402
 from draft.learn.training.ppo.legs_onnx import export_legs  # noqa: E402
+from draft.learn.training.ppo.onnx import export  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.warm_start import ALONE  # noqa: E402
 from draft.learn.training.progress import FASTEST, PROGRESS, gained  # noqa: E402
 from draft.learn.training.run import policy_file  # noqa: E402
 from draft.learn.training.train import prepare  # noqa: E402
+from draft.learn.watching.play import Player  # noqa: E402
 from tests.commands import Command  # noqa: E402
 from tests.learn.legs import mixed_plan, random_legs, robot  # noqa: E402
 from tests.learn.runs import QUICK  # noqa: E402
@@ -60,9 +65,38 @@ def test_the_actor_is_the_policy_of_the_robot(file: Path, tmp_path: Path, name: 
     assert (model.obs_normalizer._std > 0).all()
     noise = float(own.network.metadata["action_std"].split(",")[0])
     assert model.distribution.std_param.detach().numpy() == pytest.approx(noise)
+    gains = robot_of(trainer.env)
+    for actuator in gains.actuators:
+        for column, joint in enumerate(actuator.target_ids.tolist()):
+            kp, kd = (getattr(actuator, one)[0, column] for one in ("stiffness", "damping"))
+            asked = own.of_robot(robot(name))
+            assert (float(kp), float(kd)) == pytest.approx(
+                (asked.stiffness[joint], asked.damping[joint])
+            )
     origin = learn.open_run(tmp_path / "run").plan.origin
     assert origin is not None
     assert origin.policy_file == file
+
+
+def test_an_export_and_its_evaluation_keep_the_gains_of_the_policy_that_it_started_from(
+    file: Path, tmp_path: Path
+) -> None:
+    weak = replace(robot("quadruped"), peak_torque=(40.0,) * 12)
+    of = replace(plan(values=SYMMETRIC, **FLAT), members=(weak,))
+    run = learn.begin(tmp_path / "run", of, {}, file)
+    assert run.plan.config.actuation.support == 0.6
+    with contextlib.closing(Trainer(run, "cpu", engine=QUICK)) as trainer:
+        trainer.keep()
+    own = open_legs_policy(file).of_robot(weak)
+    assert not np.allclose(own.servo_torque, own.peak_torque)
+    with contextlib.closing(Player(run, "cpu", engine=QUICK)) as player:
+        export(player, run, tmp_path / "own.onnx")
+    found = open_policy(tmp_path / "own.onnx")
+    assert found.stiffness == pytest.approx(own.stiffness)
+    assert found.damping == pytest.approx(own.damping)
+    assert config_of(found).actuation == config_of(own).actuation == run.plan.config.actuation
+    resumed = learn.begin(tmp_path / "run", of, {}, None)
+    assert resumed.plan == run.plan
 
 
 def test_a_mixture_starts_with_the_policy_itself(file: Path, tmp_path: Path) -> None:

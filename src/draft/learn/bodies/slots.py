@@ -157,6 +157,23 @@ def slots_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> Slots:
     return _Pose(member, model).slots()
 
 
+def servo_torque(member: LeggedRobot, slots: Slots, support: float) -> Array:
+    """Torque that the gains of each servo are for [N m], shape (joints,).
+
+    That is the motor's peak torque, and of hip pitch and knee at least a share of m g L: gains by
+    the motor alone let a robot with weak motors sink under its weight, and its actions move little.
+
+    Args:
+        member: the robot.
+        slots: its slots.
+        support: the share; 0 for the motors alone.
+    """
+    places, peak = np.array(slots.joints), np.array(member.peak_torque)
+    lifts = (places >= 0) & np.isin(places % len(ROLES), (_PITCH, _KNEE))
+    least = support * member.mass * GRAVITY * member.leg_length
+    return np.where(lifts, np.maximum(peak, least), peak)
+
+
 def describe(member: LeggedRobot, model: mujoco.MjModel | None = None) -> tuple[Slots, Array]:
     """Return the slots of a robot and its numbers by slots, shape (FEATURES,); see `slot_features`.
 
@@ -319,6 +336,25 @@ def described(members: Sequence[LeggedRobot]) -> list[tuple[Slots, Array]]:
         mujoco.mj_setConst(model, data)
         found.append(describe(member, model))
     return found
+
+
+def traits(features: Array) -> Array:
+    """Numbers that tell how hard it is for a body to walk, shape (..., 4).
+
+    Means over its legs: logarithm of the hips' peak torque per m g L, place of the feet aside per
+    height of the centre of mass, logarithm of the hips' no-load speed times sqrt(L / g). And the
+    logarithm of its size.
+
+    Args:
+        features: numbers of bodies by slots, shape (..., FEATURES).
+    """
+    joints = features[..., : len(OF_JOINT) * SLOTS]
+    joints = joints.reshape(*features.shape[:-1], len(OF_JOINT), len(LEGS), len(ROLES))
+    hips, legs = joints[..., _PITCH], joints[..., 0, :, :].any(axis=-1)
+    aside = features[..., joints.shape[-3] * SLOTS :][..., 3 * len(LEGS) : 4 * len(LEGS)]
+    sums = [(one * legs).sum(axis=-1) for one in (hips[..., 1, :], aside, hips[..., 2, :])]
+    torque, width, speed = np.array(sums) / legs.sum(axis=-1)
+    return np.stack((torque, width / features[..., -1], speed, features[..., -len(OF_BODY)]), -1)
 
 
 def _row(order: int, count: int) -> int:

@@ -236,8 +236,9 @@ def config_of(policy: Policy) -> Config:
         "physics.timestep": policy.timestep,
         "physics.decimation": float(round(policy.control_period / policy.timestep)),
         "actuation.action_scale": float(np.median(policy.action_scale[turned])),
-        "actuation.stiffness": float(np.median((policy.stiffness / policy.peak_torque)[turned])),
-        "actuation.damping": float(np.median(policy.damping / policy.peak_torque)),
+        "actuation.stiffness": float(np.median((policy.stiffness / policy.servo_torque)[turned])),
+        "actuation.damping": float(np.median(policy.damping / policy.servo_torque)),
+        "actuation.support": policy.support,
         "observations.linear_velocity_noise": policy.velocity_noise,
     }
     if policy.rolls.any():

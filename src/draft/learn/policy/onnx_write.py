@@ -110,6 +110,8 @@ def of_policy(policy: Policy, member: LeggedRobot, commands: Sequence[float]) ->
         metadata |= policy.structure.texts()
     if policy.rolls.any():
         metadata["joint_rolls"] = policy.rolls.astype(int)
+    if policy.support:
+        metadata |= {"joint_servo_torque": policy.servo_torque, "support": policy.support}
     if policy.trim:
         metadata["trim"] = policy.trim.numbers()
     return chain(*policy.network.layers(), {key: text(value) for key, value in metadata.items()})

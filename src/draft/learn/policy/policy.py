@@ -67,6 +67,9 @@ class Policy:
             (joints,).
         stiffness: gain kp [N m/rad], 0 for wheels, shape (joints,).
         damping: gain kd [N m s/rad], shape (joints,).
+        servo_torque: torque that the gains are for [N m], shape (joints,); the peak torque where
+            the training gave no hip and knee more (`draft.learn.bodies.slots.servo_torque`).
+        support: least torque of hip pitch and knee there, over m g L; 0 for none.
         peak_torque: peak torque [N m], shape (joints,).
         stall_torque: torque at standstill without the current limit [N m], shape (joints,).
         no_load_speed: no-load speed [rad/s], shape (joints,).
@@ -107,6 +110,8 @@ class Policy:
     action_scale: Array
     stiffness: Array
     damping: Array
+    servo_torque: Array
+    support: float
     peak_torque: Array
     stall_torque: Array
     no_load_speed: Array
@@ -313,6 +318,11 @@ def _policy(file: Path, network: Network) -> Policy:
         action_scale=numbers("action_scale"),
         stiffness=numbers("joint_stiffness"),
         damping=numbers("joint_damping"),
+        # Gains are for the motors' torques where no other is stated.
+        servo_torque=numbers(
+            "joint_servo_torque" if "joint_servo_torque" in texts else "joint_peak_torque"
+        ),
+        support=float(texts.get("support", "0")),
         peak_torque=numbers("joint_peak_torque"),
         # A motor with a straight line has no stall torque of its own.
         stall_torque=numbers(

@@ -30,6 +30,7 @@ from draft.learn.bodies.slots import (
     feature_units,
     owned,
     readable_slots,
+    servo_torque,
 )
 from draft.learn.policy.matching import structure_of
 from draft.learn.policy.onnx_file import Network, of_layers, read
@@ -157,7 +158,8 @@ class LegsPolicy:
             *(("joint_pos", count), ("joint_vel", count), ("actions", count), ("command", 3)),
         )
         peak, most = np.array(member.peak_torque), self.commands_for(member)
-        timestep = float(texts["physics_timestep"])
+        timestep, support = float(texts["physics_timestep"]), float(texts.get("support", "0"))
+        servo = servo_torque(member, slots, support)
         return Policy(
             file=self.file,
             network=self._network(
@@ -173,8 +175,10 @@ class LegsPolicy:
             rolls=np.zeros(count, bool),
             home=np.array(member.home),
             action_scale=np.full(count, float(texts["action_scale"])),
-            stiffness=float(texts["stiffness"]) * peak,
-            damping=float(texts["damping"]) * peak,
+            stiffness=float(texts["stiffness"]) * servo,
+            damping=float(texts["damping"]) * servo,
+            servo_torque=servo,
+            support=support,
             peak_torque=peak,
             stall_torque=np.array(member.stall_torque),
             no_load_speed=np.array(member.no_load_speed),

@@ -22,7 +22,7 @@ from draft.design import Design
 from draft.errors import DraftError
 from draft.learn.bodies.features import features
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
-from draft.learn.bodies.slots import describe, slots_of
+from draft.learn.bodies.slots import describe, servo_torque, slots_of
 from draft.learn.policy import policy as shipped
 from draft.learn.policy.matching import (
     Match,
@@ -367,17 +367,21 @@ def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
 def _adapted(policy: Policy, member: LeggedRobot, own: ArrayLike, match: Match) -> Policy:
     """Policy with the joints, home pose, motors and gains of a design, and the features of it.
 
-    Training gives servos a stiffness and a damping per peak torque, so both scale with it; targets
-    of wheels scale with their no-load speed.
+    Training gives servos a stiffness and a damping per peak torque or per what the weight asks, so
+    both scale with it; targets of wheels scale with their no-load speed.
     """
     peak, fastest = match.taken(member.peak_torque), match.taken(member.no_load_speed)
-    stronger = peak / policy.peak_torque
+    servo = peak
+    if policy.support:
+        servo = match.taken(servo_torque(member, slots_of(member), policy.support).tolist())
+    stronger = servo / policy.servo_torque
     faster = np.where(policy.rolls, fastest / policy.no_load_speed, 1.0)
     return replace(
         policy,
         joints=tuple(member.joints[j] for j in match.joints),
         sign=np.array(match.sign),
         home=match.taken(member.home),
+        servo_torque=servo,
         peak_torque=peak,
         stall_torque=match.taken(member.stall_torque),
         no_load_speed=fastest,

@@ -156,6 +156,7 @@ ANY = Recipe(
         "learning.kl": Change(0.03, "it is a sum over up to 29 joints"),
         "learning.least_rate": Change(1e-4, "with 2e-4 steps are twice as large as that asks"),
         "learning.entropy": Change(0.001, "it is a sum over up to 29 joints"),
+        "actuation.support": Change(0.6, "gains by the motor alone let weak robots sink and fall"),
         "velocity.forward": Change(6.5, "3 sqrt(g L); the robots end the growth before"),
         "velocity.sideways": Change(0.5, "0.23 sqrt(g L)"),
         "velocity.turn": Change(1.5, "0.33 sqrt(g / L)"),

@@ -74,6 +74,7 @@ def begin(
         plan = replace(plan, origin=run.plan.origin, see_ground=run.plan.see_ground)
         if run.plan.origin is not None:
             plan = replace(plan, see_design=run.plan.see_design)
+            plan = _with_support(plan, run.plan.config.actuation.support)
     else:
         plan = _with_origin(folder, plan, origin)
     check_same(run, plan)
@@ -117,11 +118,16 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
     # A policy that sees the ground keeps seeing it; one that does not may start to.
     sees = plan.see_ground or run.plan.see_ground
     return replace(
-        plan,
+        _with_support(plan, run.plan.config.actuation.support),
         origin=Origin(str(source), iteration, file_digest(file)),
         see_ground=sees,
         see_design=run.plan.see_design,
     )
+
+
+def _with_support(plan: Plan, support: float) -> Plan:
+    """A plan with the gains of the policy that it starts from, which knows no others."""
+    return replace(plan, config=plan.config.with_values({"actuation.support": support}))
 
 
 def with_exported(plan: Plan, name: str, file: Path) -> Plan:
@@ -154,7 +160,7 @@ def with_exported(plan: Plan, name: str, file: Path) -> Plan:
         cause = f"{file} was trained without `see_design`"
         raise DraftError(cause, "omit `see_design`")
     return replace(
-        plan,
+        _with_support(plan, policy.support),
         origin=origin,
         see_ground=plan.see_ground or bool(len(policy.scan_points)),
         see_design=sees_design,

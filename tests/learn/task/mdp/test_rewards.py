@@ -15,15 +15,9 @@ from draft.learn.task.constants import Scaled
 from draft.learn.task.groups import Rewards
 from draft.learn.task.mdp import rewards
 from tests.changed_package import ChangedPackage
-from tests.learn.task.states import ask, each, first, place, roots, stand, turn
+from tests.learn.task.states import ask, each, first, place, roots, stand, turn, value
 
 TILT = 0.3
-
-
-def value(env: Any, name: str) -> torch.Tensor:
-    """What a reward term gives, before its weight."""
-    term = env.reward_manager.get_term_cfg(name)
-    return term.func(env, **term.params)
 
 
 def near(found: torch.Tensor, expected: Any, tolerance: float = 1e-5) -> None:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.bodies.slots import slot_features, traits
 from draft.learn.engine.rows import BODIES_ERROR, BODIES_WORST, Row
 from draft.learn.engine.worlds.ranks import Ranks, rank_seed
 from draft.learn.task.mdp.commands import command_term
@@ -27,6 +28,7 @@ CELLS = 16  # Most groups of similar bodies.
 TURNS = 40  # Iterations that a world keeps a body: about an episode of 20 s.
 EVEN = 0.5  # Share of the draws that ignores how well cells are tracked.
 _KEPT = 0.9  # Share of a cell's previous error in its mean over iterations.
+_LOST = 2.0  # Time that a fall counts for, with a relative error of 1 [s].
 _SLOW = 0.5  # Speed that is added to the command in the relative error [m/s], times sqrt(scale).
 
 
@@ -53,7 +55,7 @@ class Bodies:
         self._env, self._members, self._ranks = env, members, ranks
         self._seed = rank_seed(seed, ranks.rank)
         self.member = robot_of(env).host_member.copy()
-        self.cell = cells(family_features(tuple(members)))
+        self.cell = cells(alike(env, members))
         self.error = np.ones(self.cell.max() + 1)
         self._sums = torch.zeros(2, len(self.error), device=env.device)
         command_term(env).divide(self._cells(), len(self.error))
@@ -68,9 +70,12 @@ class Bodies:
         command = command_of(self._env)[:, :2]
         error = (command - robot.data.root_link_lin_vel_b[:, :2]).norm(dim=1)
         relative = error / (command.norm(dim=1) + _SLOW * robot.leg_scale.sqrt())
-        cell = self._cells()
+        cell, steps = self._cells(), torch.ones_like(relative)
+        if robot.cfg.by_slots:  # A fall ends an episode, and with it what it would err.
+            lost = self._env.termination_manager.terminated * (_LOST / self._env.step_dt)
+            relative, steps = relative + lost, steps + lost
         self._sums[0].index_add_(0, cell, relative)
-        self._sums[1].index_add_(0, cell, torch.ones_like(relative))
+        self._sums[1].index_add_(0, cell, steps)
 
     def fetch(self) -> Row:
         """Update the errors of the cells by those of an iteration; return their mean and worst."""
@@ -132,6 +137,14 @@ class Bodies:
         """
         for name in ("member", "error"):
             torch.from_numpy(getattr(self, name)).copy_(state[name])
+
+
+def alike(env: ManagerBasedRlEnv, members: Sequence[LeggedRobot]) -> ArrayLike:
+    """Numbers of bodies in which those of one cell are alike, shape (bodies, numbers)."""
+    if not robot_of(env).cfg.by_slots:
+        return family_features(tuple(members))
+    values = traits(np.array(slot_features(members)))
+    return (values - values.mean(axis=0)) / values.std(axis=0).clip(min=1e-9)
 
 
 def cells(features: ArrayLike, most: int = CELLS) -> NDArray[np.intp]:

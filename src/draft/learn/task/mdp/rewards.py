@@ -144,10 +144,12 @@ def air_time(env: ManagerBasedRlEnv, most: Scaled, gate: Scaled) -> torch.Tensor
 def height(env: ManagerBasedRlEnv, target: Scaled, sigma: Scaled) -> torch.Tensor:
     """exp(-((h - h*) / sigma)^2), h the trunk's height above the ground below it.
 
-    The target is that of a quadruped; other robots keep the height of their home pose.
+    The target is that of a quadruped; other robots, and all of a training of many kinds of legs,
+    keep the height of their home pose.
     """
     robot = robot_of(env)
-    wanted = robot.scaled(target) if robot.cfg.members[0].is_quadruped else robot.height
+    own = robot.cfg.by_slots or not robot.cfg.members[0].is_quadruped
+    wanted = robot.height if own else robot.scaled(target)
     error = (ground_of(env).height() - wanted) / robot.scaled(sigma)
     return torch.exp(-error.square())
 

@@ -23,7 +23,7 @@ from draft.design.legs import GRAVITY
 from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import REFERENCE_LEG, LeggedRobot
 from draft.learn.bodies.payload import model_spec
-from draft.learn.bodies.slots import described
+from draft.learn.bodies.slots import described, servo_torque
 from draft.learn.task.config import Config
 from draft.learn.task.constants import Scaled
 from draft.learn.task.groups import Actuation
@@ -70,6 +70,8 @@ class Robot(Entity):
         weight: weight of the design, without what the task adds [N], shape (worlds,).
         design: features of the design, shape (worlds, features); see `draft.learn.bodies.features`.
         sign: sign of each joint in its slot, shape (worlds, joints); ones without slots.
+        servo_torque: torque that the gains of each joint are for [N m], shape (worlds, joints); see
+            `draft.learn.bodies.slots.servo_torque`.
         wheels: indices of the joints that drive wheels, shape (wheels,).
     """
 
@@ -86,6 +88,7 @@ class Robot(Entity):
     home: torch.Tensor
     ranges: torch.Tensor
     sign: torch.Tensor
+    servo_torque: torch.Tensor
 
     def initialize(self, mj_model: mujoco.MjModel, model: Any, data: Any, device: str) -> None:
         """Allocate the state, and give every world the numbers of its design."""
@@ -118,11 +121,15 @@ class Robot(Entity):
     def _of_designs(
         self, members: Sequence[LeggedRobot], device: str | torch.device
     ) -> dict[str, torch.Tensor]:
-        if self.cfg.by_slots:
+        support = self.cfg.actuation.support
+        servos: list[ArrayLike] = [one.peak_torque for one in members]
+        if self.cfg.by_slots or support:
             slots, features = zip(*described(members), strict=True)
-            return _numbers(members, features, [one.signs for one in slots], device)
+            servos = [servo_torque(*one, support) for one in zip(members, slots, strict=True)]
+            if self.cfg.by_slots:
+                return _numbers(members, features, [one.signs for one in slots], servos, device)
         signs = [(1.0,) * len(one.joints) for one in members]
-        return _numbers(members, family_features(tuple(members)), signs, device)
+        return _numbers(members, family_features(tuple(members)), signs, servos, device)
 
     def unit_logarithms(self) -> torch.Tensor:
         """Logarithms of sqrt(g L) and sqrt(L / g) of each world's design, shape (worlds, 2)."""
@@ -150,6 +157,8 @@ class Robot(Entity):
         """
         # Earlier states knew straight lines only, and no term of theirs needed masses or heat.
         own = ("weight", "copper_loss", *["sign"] * (not self.cfg.by_slots))
+        if not self.cfg.actuation.support:
+            own = (*own, "servo_torque")
         usual = {name: getattr(self, name) for name in own}
         numbers = {"stall_torque": numbers["peak_torque"], **usual, **numbers}
         self.redrawn = True
@@ -184,9 +193,10 @@ class Robot(Entity):
             factors = self._motors[:, joints]
             torque = factors * self.peak_torque[:, joints]
             stall = factors * self.stall_torque[:, joints]
+            servo = factors * self.servo_torque[:, joints]
             values = {
-                "stiffness": stiffness * torque * turned[:, joints],
-                "damping": damping * torque,
+                "stiffness": stiffness * servo * turned[:, joints],
+                "damping": damping * servo,
                 "force_limit": torque,
                 "saturation_effort": stall,
                 "velocity_limit_motor": self.no_load_speed[:, joints],
@@ -199,7 +209,7 @@ class Robot(Entity):
 
 NUMBERS = (
     *("leg_scale", "height", "top_speed", "peak_torque", "stall_torque", "no_load_speed", "design"),
-    *("home", "ranges", "weight", "copper_loss", "sign"),
+    *("home", "ranges", "weight", "copper_loss", "sign", "servo_torque"),
 )
 
 
@@ -207,6 +217,7 @@ def _numbers(
     members: Sequence[LeggedRobot],
     features: Sequence[ArrayLike],
     signs: Sequence[ArrayLike],
+    servos: Sequence[ArrayLike],
     device: str | torch.device,
 ) -> dict[str, torch.Tensor]:
     """Numbers of designs by name, shape (designs, ...)."""
@@ -221,6 +232,7 @@ def _numbers(
         "weight": [GRAVITY * m.mass for m in members],
         "design": np.array(features),
         "sign": np.array(signs),
+        "servo_torque": np.array(servos),
         "home": [m.home for m in members],
         "ranges": [m.ranges for m in members],
     }

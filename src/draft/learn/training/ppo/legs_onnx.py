@@ -90,6 +90,7 @@ def _metadata(run: Run, iteration: int) -> dict[str, str]:
         "action_scale": f"{config.actuation.action_scale:.9g}",
         "stiffness": f"{config.actuation.stiffness:.9g}",
         "damping": f"{config.actuation.damping:.9g}",
+        "support": f"{config.actuation.support:.9g}",
         **{f"features_of_{legs}": _row(values.ravel()) for legs, values in ends.items()},
         "commands": _commands(run, iteration),
         "draft_version": own_version(),

@@ -99,6 +99,9 @@ def metadata(player: Loaded, run: Run) -> dict[str, str]:
     }
     if member.corner_speed:
         values["joint_stall_torque"] = list(member.stall_torque)
+    if plan.config.actuation.support:
+        values["joint_servo_torque"] = robot_of(env).servo_torque[0].tolist()
+        values["support"] = plan.config.actuation.support
     if member.rolls:
         values["joint_rolls"] = list(map(int, member.rolls))
     values |= structure_of(member).texts()
