@@ -7,8 +7,9 @@
 Bodies of every kind of the generator, drawn with another seed than those of the training, and of
 three kinds that are never trained: quadrupeds whose knees point away from each other or whose legs
 have five joints, and bodies on eight legs. Each is asked to walk ahead, sideways and to turn, and
-is pushed. It also prints the time of one action and the top speed of the shipped humanoid, holds
-them against bars, and takes some five minutes on two idle cores.
+is pushed. It also prints the time of one action, the top speed of the shipped humanoid, and those
+of the bodies of `benchmarks.family` over what the policy of all quadrupeds reaches in the same
+physics. It holds them against bars, and takes some eight minutes on two idle cores.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from rich.console import Console
 from rich.table import Table
 
 import draft
+from benchmarks.family import drawn
 from benchmarks.roll_outs import (
     FOLLOWED,
     PUSH,
@@ -52,7 +54,7 @@ from draft.learn.bodies.features import GRAVITY
 from draft.learn.bodies.generated import KINDS, generate_kind
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.engine.machine import cores
-from draft.learn.measuring.policies import of_legs
+from draft.learn.measuring.policies import of_legs, open_source
 from draft.learn.measuring.scalars import SURVIVAL
 from draft.learn.policy.policy import ANY
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy
@@ -60,6 +62,8 @@ from draft.learn.silence import quiet
 
 HUMANOID = "humanoid"
 SPEEDS = tuple(0.1 * i for i in range(1, 9))  # Commands of its top speed [sqrt(g L)].
+FAMILY_SPEEDS = tuple(0.25 * i for i in range(1, 13))  # Of bodies of the truth map [sqrt(g L)].
+FAMILY_BODIES, FAMILY_SEED, FAMILY_SHARE = 12, 1, 0.95
 ACTIONS = 2000  # Actions that are timed.
 TRAINED_SEED = 0
 # Groups of kinds that a bar is for, and what its bodies have to stay up at.
@@ -150,6 +154,7 @@ def measured(
         "kinds": [rows[name] for name in names],
         "action": {"joints": len(humanoid.joints), "ms": action_time(legs, humanoid)},
         "humanoid": humanoid_speed(legs, humanoid, replicas, seconds),
+        "family": family_speeds(legs, replicas, seconds),
     }
 
 
@@ -234,6 +239,34 @@ def humanoid_speed(
     }
 
 
+def family_speeds(legs: LegsPolicy, replicas: int, seconds: float) -> dict[str, Any]:
+    """Top speeds of bodies of the truth map with both policies, per sqrt(g L), and their ratio."""
+    members = [body.robot for body in drawn(FAMILY_BODIES, FAMILY_SEED)]
+    own, family = of_legs(legs, legs.file.name, members[0]), open_source(None)
+    physics = {"episodes.contact_time": own.plan.config.episodes.contact_time}
+    of_family = replace(family.plan, config=family.plan.config.with_values(physics))
+    cases = [Case.ahead(speed) for speed in FAMILY_SPEEDS]
+    options = {"replicas": 2 * replicas, "seconds": seconds, "threads": cores()}
+    speeds = [
+        [rounded(speed) for speed in top_speeds(rolled_out(source, members, cases, **options))]
+        for source in (own, replace(family, plan=of_family))
+    ]
+    ratios = [first / second for first, second in zip(*speeds, strict=True) if second]
+    return {
+        "commands": list(FAMILY_SPEEDS),
+        "speeds": speeds[0],
+        "of_family": speeds[1],
+        "ratio": rounded(float(np.median(ratios))) if ratios else None,
+    }
+
+
+def top_speeds(found: Rolled) -> list[float]:
+    """Largest speed of each robot over the cases in which four of five stay up; 0 for none."""
+    up, ahead = found.fell == 0, found.velocity[..., 0]
+    mean = np.where(up, ahead, 0.0).sum(axis=1) / up.sum(axis=1).clip(min=1)
+    return np.where(up.mean(axis=1) >= SURVIVAL, mean, 0.0).max(axis=0).tolist()
+
+
 def bars(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Numbers of `measured` against their bars."""
     kinds = {row["kind"]: row for row in found["kinds"]}
@@ -261,6 +294,8 @@ def bars(found: Mapping[str, Any]) -> list[dict[str, Any]]:
         rows.append(bar(what, worst["cases"][at]["up"], UNTRAINED_UP, "%"))
     speed, action = found["humanoid"]["top_speed"], found["action"]
     rows.append(bar("shipped humanoid, top speed", speed, HUMANOID_SPEED, "m/s"))
+    what = f"{FAMILY_BODIES} quadrupeds, top speed over that by the policy of all quadrupeds"
+    rows.append(bar(what, found["family"]["ratio"], FAMILY_SHARE))
     rows.append(bar("file", found["policy"]["megabytes"], MEGABYTES, "MB", at_least=False))
     what = f"one action, NumPy, {action['joints']} joints"
     return [*rows, bar(what, action["ms"], MILLISECONDS, "ms", at_least=False)]

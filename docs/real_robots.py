@@ -34,7 +34,7 @@ from draft.learn.policy.validity import ANY_NAME, FAMILY_NAME
 from draft.plotting import decorate, make_folder
 from draft.twins.compare import compare_twin
 from draft.validation.causes import JUDGED as CAUSED
-from draft.validation.physics import USUAL
+from draft.validation.physics import SETTINGS, USUAL
 from draft.values import brief
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -354,7 +354,8 @@ def _physics() -> list[str]:
         "| physics | " + " | ".join(SHOWN[name][0] for name in shown) + " |",
         "| --- |" + " --- |" * len(shown),
     ]
-    for setting_ in dict.fromkeys(row["setting"] for row in rows):
+    measured = {row["setting"] for row in rows}
+    for setting_ in (one.label for one in SETTINGS if one.label in measured):
         cells = []
         for name in shown:
             of = [

@@ -12,7 +12,7 @@ pytest.importorskip("mjlab")
 
 import draft
 from benchmarks import any_legs, untrained, zero_shot
-from benchmarks.roll_outs import Case, rolled_out
+from benchmarks.roll_outs import Case, Rolled, rolled_out
 from draft.learn.bodies.generated import KINDS, generate_kind
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.bodies.slots import slots_of
@@ -97,3 +97,14 @@ def test_kinds_that_are_never_trained_can_be_drawn(tmp_path: Path) -> None:
 def test_each_kind_of_the_generator_has_a_bar() -> None:
     named = [name for names, *_ in any_legs.GROUPS.values() for name in names]
     assert sorted(named) == sorted(KINDS)
+
+
+def test_a_top_speed_is_the_highest_at_which_four_of_five_stay_up() -> None:
+    """Two robots at three commands, five roll-outs each; the second falls at all but the first."""
+    fell = np.zeros((3, 5, 2))
+    fell[1, :2, 1] = fell[2, 0, 0] = fell[2, :, 1] = 1
+    velocity = np.zeros((3, 5, 2, 3))
+    velocity[..., 0] = np.array([0.4, 0.9, 1.3])[:, None, None]
+    velocity[2, 0, 0] = 9.0  # As it falls, it is fast.
+    found = Rolled(tuple(map(Case.ahead, (0.5, 1.0, 1.5))), fell, velocity, fell, ())
+    assert any_legs.top_speeds(found) == pytest.approx([1.3, 0.4])
