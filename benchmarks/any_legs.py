@@ -243,10 +243,12 @@ def family_speeds(legs: LegsPolicy, replicas: int, seconds: float) -> dict[str, 
     """Top speeds of bodies of the truth map with both policies, per sqrt(g L), and their ratio."""
     members = [body.robot for body in drawn(FAMILY_BODIES, FAMILY_SEED)]
     own, family = of_legs(legs, legs.file.name, members[0]), open_source(None)
-    physics = {"episodes.contact_time": own.plan.config.episodes.contact_time}
+    config = own.plan.config
+    physics = {"episodes.contact_time": config.episodes.contact_time}
     of_family = replace(family.plan, config=family.plan.config.with_values(physics))
     cases = [Case.ahead(speed) for speed in FAMILY_SPEEDS]
     options = {"replicas": 2 * replicas, "seconds": seconds, "threads": cores()}
+    options["velocity_noise"] = config.observations.linear_velocity_noise
     speeds = [
         [rounded(speed) for speed in top_speeds(rolled_out(source, members, cases, **options))]
         for source in (own, replace(family, plan=of_family))

@@ -1,7 +1,7 @@
 """What one policy for all legs can do: writes docs/any-legs.md.
 
-    python -m benchmarks.any_legs --out examples/results/any_legs.json    # five minutes
-    python -m benchmarks.zero_shot --out examples/results/zero_shot.json  # the same
+    python -m benchmarks.any_legs --out examples/results/any_legs.json    # eight minutes
+    python -m benchmarks.zero_shot --out examples/results/zero_shot.json  # seven
     python -m benchmarks.zero_shot --velocity-noise 0.5 --out examples/results/zero_shot_noisy.json
     python -m benchmarks.looks --out examples/results/looks.json          # half a minute
     python -m docs.any_legs --pictures   # film strips of robots that walk, and the page

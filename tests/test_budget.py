@@ -27,14 +27,14 @@ BUDGET = {
     "fitting": 3_890,
     "imports": 6_462,  # Folders and missing files for descriptions.
     "laws": 2_090,  # The nearest module of the catalogue.
-    "learn": 21_110,  # Gains by weight; falls that slow growth; cells of bodies of any legs.
+    "learn": 21_130,  # Gains by weight, in every file; cells of bodies of any legs.
     "metrics": 3_200,
     "model": 5_655,  # USD; configurations for mjlab and Isaac Lab; parts in every format.
     "reporting": 1_614,  # A policy that drives no robot of a report is refused.
     "serving": 706,  # Files and messages for a page on this machine.
     "spec": 5_958,  # Remedies of units and of a single = in expressions.
     "studio": 3_160,
-    "study": 6_505,  # Stages that start from policies that ship.
+    "study": 6_506,  # Stages keep the gains of the policy that they start from.
     "twins": 1_600,
     "validation": 992,
     "variation": 350,

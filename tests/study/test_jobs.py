@@ -182,6 +182,15 @@ def test_a_stage_may_start_from_a_policy_that_ships(tmp_path: Path) -> None:
     assert not other.holds(tmp_path, run.folder)
 
 
+def test_stages_keep_the_gains_of_the_policy_of_all_legs_that_the_first_started_from() -> None:
+    made = jobs(TEXT.replace("environments: 4\n", "") + "recipe: tune\nstart: {base: any}\n")
+    support = [
+        training(made, f"bear-{stage}-0").plan.config.actuation.support
+        for stage in ("base", "push")
+    ]
+    assert support == [0.6, 0.6]
+
+
 def test_a_toy_keeps_the_layers_of_a_policy_that_it_starts_from() -> None:
     text = TEXT + "recipe: tune\nstart: {base: family}\ntoy: {iterations: 1}\n"
     toy = study(text, toy=True)

@@ -17,7 +17,7 @@ from draft.learn.measuring.evaluation_options import Extras, Options, RollOuts
 from draft.learn.measuring.summary import ARMS, FORMAT, PROTOCOLS
 from draft.learn.task.stages import STAGES
 from draft.learn.training import run as runs
-from draft.learn.training.session import with_exported
+from draft.learn.training.session import with_exported, with_support
 from draft.study.file import Study, at_place
 from draft.study.jobs import (
     REPORT,
@@ -64,6 +64,7 @@ def _training(
         # A policy that saw the ground keeps seeing it; one that did not may start to.
         sees = plan.see_ground or origin.plan.see_ground
         plan = replace(plan, see_ground=sees, see_design=origin.plan.see_design)
+        plan = with_support(plan, origin.plan.config.actuation.support)
     iterations = study.iterations(stage)
     determinants = plan.record() | {"from": origin.key if origin else None, "code": _code()}
     return Training(

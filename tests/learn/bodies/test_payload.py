@@ -17,6 +17,7 @@ from draft.learn.bodies.designs import open_bodies
 from draft.learn.bodies.family_fields import family_fields
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.bodies.payload import model_spec, with_payload
+from draft.learn.bodies.slots import servo_torque, slots_of
 from draft.learn.measuring import evaluation
 from draft.learn.measuring.evaluation_options import Options
 from draft.learn.measuring.levels import skill_tests
@@ -47,6 +48,14 @@ def test_nothing_else_changes_and_a_second_payload_has_a_name_of_its_own() -> No
     model = model_spec(with_payload([trained], 4)[0]).compile()
     assert model.body("payload").mass[0] == pytest.approx(3)
     assert model.body("payload_").mass[0] == pytest.approx(4)
+
+
+def test_gains_are_those_of_the_robot_without_the_block() -> None:
+    (robot,) = with_payload([member()], 10)
+    assert robot.own_mass == pytest.approx(member().mass, rel=1e-6)
+    slots = slots_of(member())
+    assert servo_torque(robot, slots, 1.2) == pytest.approx(servo_torque(member(), slots, 1.2))
+    assert servo_torque(member(), slots, 1.2).tolist() != list(member().peak_torque)
 
 
 def test_each_body_of_a_family_carries_its_own_block() -> None:

@@ -344,7 +344,15 @@ def test_worlds_are_given_other_designs_while_a_simulation_runs(
     assert turn == pytest.approx(first * (np.array(scale) / scale[2]) ** -0.5)
     # A saved state has them: another simulation continues from it with the same designs.
     fresh.reset()
-    restore(fresh, capture(made))
+    saved = capture(made)
+    if engine == "native":  # States of before gains could follow the weight lack a number.
+        gains = [name for name in saved["tensors"] if name.endswith(".servo_torque")]
+        assert gains
+        for name in gains:
+            del saved["tensors"][name]
+        del saved["designs"]["servo_torque"]
+    restore(fresh, saved)
+    assert torch.equal(robot.servo_torque, fresh.scene["robot"].servo_torque)
     for each in (made, fresh):
         for _ in range(5):
             each.step(0.1 * torch.ones(4, 12))

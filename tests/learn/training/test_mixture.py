@@ -33,7 +33,6 @@ from draft.learn.measuring.rollout.by_slots import by_slots  # noqa: E402
 from draft.learn.policy import video  # noqa: E402
 from draft.learn.policy.playback import Outcome, Playback  # noqa: E402
 from draft.learn.policy.reduced import LegsPolicy, open_legs_policy  # noqa: E402
-from draft.learn.task.mdp.commands import command_term  # noqa: E402
 from draft.learn.task.mdp.environment import environment  # noqa: E402
 from draft.learn.task.recipes import ANY  # noqa: E402
 from draft.learn.task.world.access import robot_of  # noqa: E402
@@ -93,29 +92,6 @@ def test_worlds_are_divided_by_the_numbers_of_bodies() -> None:
         assert shares == pytest.approx(1.0, abs=0.1)
     assert by_bodies(10, [4, 2, 2, 1, 2], 2) == [2] * 5
     assert by_bodies(7, [3], 2) == [7]
-
-
-def test_a_fall_counts_as_the_rest_of_a_fast_command_not_followed(run: Run) -> None:
-    """A fall ends the episode, so that no later sample could tell that it was too fast."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        env = Worlds(run.plan, "cpu", "native", 0, 1).envs[0]
-    term: Any = command_term(env)
-    fallen, since = env.termination_manager._terminated_buf, term._since
-    term.pushed = None
-    for share, age, fell, counted in (
-        (0.9, 1.0, True, 3.0),
-        (0.5, 1.0, True, 0.0),
-        (0.9, 0.02, True, 0.0),
-        (0.9, 1.0, False, 0.0),
-    ):
-        term._reached.zero_()
-        speed = share * float(term.range_now()[0, 0])
-        fallen[0], since[0], term.time_left[0], term.vel_command_b[0, 0] = fell, age, 3.0, speed
-        term.reset(torch.tensor([0]))
-        steps = counted / env.step_dt
-        found = term._reached[term.group[0]].tolist()
-        assert found == pytest.approx([steps, steps * speed, 0.0])
-    env.close()
 
 
 def test_robots_of_all_legs_are_to_keep_the_height_of_their_home_pose(run: Run) -> None:

@@ -99,6 +99,16 @@ def test_an_export_and_its_evaluation_keep_the_gains_of_the_policy_that_it_start
     assert resumed.plan == run.plan
 
 
+def test_gains_that_the_policy_does_not_have_are_refused(file: Path, tmp_path: Path) -> None:
+    of = plan(values={**SYMMETRIC, "actuation.support": 0.5}, **FLAT)
+    with pytest.raises(DraftError, match=r"actuation.support is 0.5, and the .* has 0.6\n.*omit"):
+        learn.begin(tmp_path / "run", replace(of, members=(robot("biped"),)), {}, file)
+    wheels = replace(of, members=(robot("wheeled"),))
+    with pytest.raises(DraftError, match=r"actuation.support is for hip pitch .* drives a wheel"):
+        learn.begin(tmp_path / "run", wheels, {}, "scratch")
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_mixture_starts_with_the_policy_itself(file: Path, tmp_path: Path) -> None:
     trainer = Trainer(learn.begin(tmp_path / "run", mixed_plan(), {}, file), "cpu", engine=QUICK)
     own = open_legs_policy(file).network

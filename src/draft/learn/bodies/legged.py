@@ -27,6 +27,7 @@ from draft.metrics.rolling import driven_wheels, rolling_speed
 from draft.metrics.speed import top_speed
 from draft.model import pose
 from draft.model.texts import Text, with_template
+from draft.spec.payload import USUAL_DENSITY
 from draft.values import Value, scalar
 
 REFERENCE_LEG = 0.48  # Thigh plus shank of the cheetah [m]; scale s = L / 0.48 m (paper).
@@ -108,6 +109,11 @@ class LeggedRobot:
     def xml(self) -> str:
         """MJCF of the robot as one string."""
         return str(self.text)
+
+    @property
+    def own_mass(self) -> float:
+        """Total mass without the payload of an evaluation [kg]."""
+        return self.mass - (USUAL_DENSITY * (2 * self.block[0]) ** 3 if self.block else 0.0)
 
     @property
     def stall_torque(self) -> tuple[float, ...]:

@@ -170,7 +170,7 @@ def servo_torque(member: LeggedRobot, slots: Slots, support: float) -> Array:
     """
     places, peak = np.array(slots.joints), np.array(member.peak_torque)
     lifts = (places >= 0) & np.isin(places % len(ROLES), (_PITCH, _KNEE))
-    least = support * member.mass * GRAVITY * member.leg_length
+    least = support * member.own_mass * GRAVITY * member.leg_length
     return np.where(lifts, np.maximum(peak, least), peak)
 
 

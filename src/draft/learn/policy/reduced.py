@@ -45,10 +45,19 @@ _NARROW = 0.1  # Width of a range of features below which it counts as this wide
 LAYOUT = "slots, knees by their bend, centre of mass"
 # Largest divisor of an observation that is constant in the training, with the epsilon of rsl-rl.
 _CONSTANT = 1.01e-2
-# Trims on two legs and on more, chosen on generated bodies, without units: rates, largest states.
-# On two legs a command that is shifted toward zero lets the policy stand, and fall.
-_BY_LEAN = np.array([0.0, 0.0, 0.0, 0.05, 0.05]), np.array([0.0, 0.0, 0.0, 0.15, 0.15])
-_BY_COMMAND = np.array([0.1, 0.1, 0.1, 0.0, 0.0]), np.array([0.2, 0.2, 0.15, 0.0, 0.0])
+# Trims on two legs and on more, chosen on generated bodies, without units: rates, largest states,
+# and largest vx, vy and wz that are observed, over those of the training. On two legs a speed that
+# is shifted toward zero lets the policy stand, and fall.
+_BY_LEAN = (
+    np.array([0.0, 0.0, 0.1, 0.05, 0.05]),
+    np.array([0.0, 0.0, 0.2, 0.15, 0.15]),
+    np.array([1.0, 1.0, 1.0]),
+)
+_BY_COMMAND = (
+    np.array([0.1, 0.1, 0.1, 0.0, 0.0]),
+    np.array([0.2, 0.2, 0.15, 0.0, 0.0]),
+    np.array([1.0, 1.6, 1.6]),
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,8 +106,8 @@ class LegsPolicy:
 
     def trim(self, legs: int) -> Trim:
         """Trim of a robot with this number of legs, in units of sqrt(L / g) and sqrt(g L)."""
-        rate, most = _BY_LEAN if legs == 2 else _BY_COMMAND
-        return Trim(rate, most, self._commands(legs))
+        rate, most, beyond = _BY_LEAN if legs == 2 else _BY_COMMAND
+        return Trim(rate, most, beyond * self._commands(legs))
 
     def _commands(self, legs: int) -> Array:
         least = np.min([*self.commands.values()], axis=0)

@@ -12,6 +12,7 @@ from draft.errors import DraftError, counted
 from draft.extras import check
 from draft.files import lock
 from draft.learn.bodies.legged import check_family
+from draft.learn.bodies.slots import slots_of
 from draft.learn.engine import machine
 from draft.learn.engine.machine import KINDS, NATIVE, Engine
 from draft.learn.policy.reduced import LegsPolicy, open_for, open_legs_policy
@@ -67,6 +68,13 @@ def begin(
         if plan.see_design and not plan.mixed and not member.is_quadruped:
             cause = f"{member.name} has no features that a policy could see: it is no quadruped"
             raise DraftError(cause, "omit `see_design`")
+    if plan.config.actuation.support and not plan.mixed:
+        try:
+            slots_of(plan.members[0])
+        except DraftError as error:
+            cause = error.problems[0].cause
+            cause = f"actuation.support is for hip pitch and knee of each leg: {cause}"
+            raise DraftError(cause, "omit actuation.support") from None
     if not is_run(folder):
         return create(folder, _with_origin(folder, plan, origin), dict(designs))
     run = open_run(folder)
@@ -74,7 +82,7 @@ def begin(
         plan = replace(plan, origin=run.plan.origin, see_ground=run.plan.see_ground)
         if run.plan.origin is not None:
             plan = replace(plan, see_design=run.plan.see_design)
-            plan = _with_support(plan, run.plan.config.actuation.support)
+            plan = with_support(plan, run.plan.config.actuation.support)
     else:
         plan = _with_origin(folder, plan, origin)
     check_same(run, plan)
@@ -118,15 +126,27 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
     # A policy that sees the ground keeps seeing it; one that does not may start to.
     sees = plan.see_ground or run.plan.see_ground
     return replace(
-        _with_support(plan, run.plan.config.actuation.support),
+        with_support(plan, run.plan.config.actuation.support),
         origin=Origin(str(source), iteration, file_digest(file)),
         see_ground=sees,
         see_design=run.plan.see_design,
     )
 
 
-def _with_support(plan: Plan, support: float) -> Plan:
-    """A plan with the gains of the policy that it starts from, which knows no others."""
+def with_support(plan: Plan, support: float) -> Plan:
+    """Return a plan of one topology with the gains of the policy that it starts from.
+
+    Args:
+        plan: the plan.
+        support: the policy's `actuation.support`.
+
+    Raises:
+        DraftError: the plan states another one.
+    """
+    own = plan.config.actuation.support
+    if own and own != support:
+        cause = f"actuation.support is {own:g}, and the policy to start from has {support:g}"
+        raise DraftError(cause, "omit actuation.support, or start from scratch")
     return replace(plan, config=plan.config.with_values({"actuation.support": support}))
 
 
@@ -160,7 +180,7 @@ def with_exported(plan: Plan, name: str, file: Path) -> Plan:
         cause = f"{file} was trained without `see_design`"
         raise DraftError(cause, "omit `see_design`")
     return replace(
-        _with_support(plan, policy.support),
+        with_support(plan, policy.support),
         origin=origin,
         see_ground=plan.see_ground or bool(len(policy.scan_points)),
         see_design=sees_design,

@@ -144,14 +144,15 @@ def alike(env: ManagerBasedRlEnv, members: Sequence[LeggedRobot]) -> ArrayLike:
     if not robot_of(env).cfg.by_slots:
         return family_features(tuple(members))
     values = traits(np.array(slot_features(members)))
-    return (values - values.mean(axis=0)) / values.std(axis=0).clip(min=1e-9)
+    # The weights set the order in which they are halved, which rounding would set otherwise.
+    return values / values.std(axis=0).clip(min=1e-9) * np.array([1.03, 1.02, 1.01, 1.0])
 
 
 def cells(features: ArrayLike, most: int = CELLS) -> NDArray[np.intp]:
     """Divide bodies into cells of the same size, by halving along the feature that varies most.
 
-    Features are logarithms, so their variances compare. The cells are those of a k-d tree (Bentley,
-    "Multidimensional binary search trees used for associative searching", 1975).
+    Features are logarithms, or of equal variances, so that these compare. The cells are those of a
+    k-d tree (Bentley, "Multidimensional binary search trees used for associative searching", 1975).
 
     Args:
         features: shape (bodies, features).

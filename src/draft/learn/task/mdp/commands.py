@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 # with it, of a command and of an episode [s]; samples per world after which the largest |vx| may
 # grow.
 _FAST, _LONG, _STEADY, _ENOUGH = 0.7, 1.5, 4.0, 4
-_DRAWN = 0.1  # Age of a command that was just drawn [s].
 
 
 class Growth(NamedTuple):
@@ -196,8 +195,6 @@ class VelocityCommand(UniformVelocityCommand):
     # mjlab declares values as floats, which would wait for the device.
     def reset(self, env_ids: Any) -> dict[str, Any]:
         """Draw new commands; the metrics stay on the device."""
-        if self.cfg.growth is not None and robot_of(self._env).cfg.by_slots:
-            self._count_falls(env_ids)
         extras = {}
         for name, values in self.metrics.items():
             extras[name] = values[env_ids].mean()
@@ -234,29 +231,15 @@ class VelocityCommand(UniformVelocityCommand):
         if cfg.away is not None:
             self._lead_away(env_ids, cfg.away)
 
-    def _fast(self) -> torch.Tensor:
-        """Whether each world's robot is asked a fast |vx|, and is not kicked."""
-        fast = self.vel_command_b[:, 0].abs() > _FAST * self.range_now()[:, 0]
-        return fast if self.pushed is None else fast & ~self.pushed
-
-    def _count_falls(self, worlds: Any) -> None:
-        """Count what is left of a fast command as not followed, where a fall ended the episode."""
-        fallen = torch.zeros(self.num_envs, device=self.device)
-        # A command that was just drawn followed a fall, and did not end in it.
-        fallen[worlds] = (self._env.termination_manager.terminated & (self._since > _DRAWN))[
-            worlds
-        ].float()
-        steps = fallen * self._fast() * (self.time_left / self._env.step_dt)
-        speed = steps * self.vel_command_b[:, 0].abs()
-        self._reached.index_add_(0, self.group, torch.stack((steps, speed, 0 * steps), dim=1))
-
     def _grow(self, growth: Growth) -> None:
         """Compare measured speeds with fast commands: grow where tracked, shrink where missed."""
         self._since += self._env.step_dt
-        forward = self.vel_command_b[:, 0]
-        fast = self._fast() & (self._since > _LONG)
+        forward, largest = self.vel_command_b[:, 0], self.range_now()[:, 0]
+        fast = (forward.abs() > _FAST * largest) & (self._since > _LONG)
         # A robot that falls ahead is fast too.
         fast &= self._env.episode_length_buf > _STEADY / self._env.step_dt
+        if self.pushed is not None:
+            fast &= ~self.pushed
         along = self.robot.data.root_link_lin_vel_b[:, 0] * forward.sign()
         self._reached.index_add_(
             0, self.group, torch.stack((fast.float(), forward.abs() * fast, along * fast), dim=1)

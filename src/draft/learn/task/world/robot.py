@@ -157,10 +157,9 @@ class Robot(Entity):
         """
         # Earlier states knew straight lines only, and no term of theirs needed masses or heat.
         own = ("weight", "copper_loss", *["sign"] * (not self.cfg.by_slots))
-        if not self.cfg.actuation.support:
-            own = (*own, "servo_torque")
         usual = {name: getattr(self, name) for name in own}
-        numbers = {"stall_torque": numbers["peak_torque"], **usual, **numbers}
+        usual |= dict.fromkeys(("stall_torque", "servo_torque"), numbers["peak_torque"])
+        numbers = {**usual, **numbers}
         self.redrawn = True
         for name in NUMBERS:
             getattr(self, name).copy_(numbers[name])

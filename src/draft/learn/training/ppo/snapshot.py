@@ -28,6 +28,7 @@ _STATE = (
     "xfrc_applied",
 )
 _WHOLE = "sim.state"
+_SERVO = ".servo_torque"
 _MANAGERS = ("command", "action", "event", "reward", "termination", "observation", "metrics")
 # Attributes that refer to the environment, to its configuration or to the simulation.
 _REFERENCES = {"env", "cfg", "sim", "model", "data", "robot", "scene", "func_cfg", "indexing"}
@@ -60,6 +61,9 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
     """
     tensors = dict(_tensors(env))
     saved = dict(state["tensors"])
+    for path in tensors.keys() - saved.keys():
+        if path.endswith(_SERVO):  # Earlier states had gains for the motors alone.
+            saved[path] = saved[path.removesuffix(_SERVO) + ".peak_torque"]
     whole = _WHOLE in tensors and _WHOLE in saved
     for one in (tensors, saved):
         # The whole state must not be overwritten by its rounded parts. A state that the other
