@@ -40,7 +40,7 @@ from draft.values import brief
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, IMAGES = ROOT / "docs/real-robots.md", ROOT / "docs/images/real_robots"
 PHYSICS = ROOT / "examples/results/physics.json"  # Of `python -m benchmarks.physics --out`.
-UNDER = ("top_speed", "kick", "step_up", "walking_power")
+UNDER = ("top_speed", "kick", "step_up", "step_down", "walking_power")
 JUDGED = {
     "top_speed": "top speed [m/s]",
     "step_up": "step [m]",
@@ -349,7 +349,8 @@ def _physics() -> list[str]:
         "capabilities over those with the physics of the training, as the median of",
         f"{', '.join(robots)}, and the",
         "least and the greatest. What falls by a sixth or more holds on that ground alone.",
-        *([f"Left out, since there is none as trained: {', '.join(none)}."] if none else []),
+        *([f"Left out, as there is none as trained: {', '.join(none)}."] if none else []),
+        "Steps are those of the policy that climbs; a dash is not measured.",
         "",
         "| physics | " + " | ".join(SHOWN[name][0] for name in shown) + " |",
         "| --- |" + " --- |" * len(shown),

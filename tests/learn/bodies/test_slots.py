@@ -203,19 +203,21 @@ def test_a_positive_knee_bends_further_whichever_way_it_bends() -> None:
 
 
 def test_gains_of_hip_pitch_and_knee_are_for_what_the_weight_asks_of_weak_motors() -> None:
-    member = ROBOTS["biped"]
+    member = ROBOTS["quadruped"]
     slots = slots_of(member)
     least = 0.6 * member.mass * 9.81 * member.leg_length
     weak = replace(member, peak_torque=(0.5 * least,) * len(member.joints))
-    asked = [
-        least if slot >= 0 and ROLES[slot % len(ROLES)] in ("pitch", "knee") else 0.5 * least
-        for slot in slots.joints
-    ]
-    assert servo_torque(weak, slots, 0.6) == pytest.approx(np.array(asked))
+    asked = [0.5 * least if name.endswith("roll") else least for name in member.joints]
     assert {round(x / least, 3) for x in asked} == {0.5, 1.0}
+    assert servo_torque(weak, slots, 0.6) == pytest.approx(np.array(asked))
     strong = replace(member, peak_torque=(2 * least,) * len(member.joints))
     assert servo_torque(strong, slots, 0.6).tolist() == list(strong.peak_torque)
     assert servo_torque(weak, slots, 0.0).tolist() == list(weak.peak_torque)
+
+
+def test_gains_on_two_legs_are_for_the_motors_alone() -> None:
+    member = ROBOTS["biped"]
+    assert servo_torque(member, slots_of(member), 9.0).tolist() == list(member.peak_torque)
 
 
 def test_traits_are_torque_width_over_height_speed_and_size() -> None:

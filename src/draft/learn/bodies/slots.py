@@ -162,6 +162,7 @@ def servo_torque(member: LeggedRobot, slots: Slots, support: float) -> Array:
 
     That is the motor's peak torque, and of hip pitch and knee at least a share of m g L: gains by
     the motor alone let a robot with weak motors sink under its weight, and its actions move little.
+    Robots on two legs have those of their motors: their ankles would have to become stiffer too.
 
     Args:
         member: the robot.
@@ -169,6 +170,8 @@ def servo_torque(member: LeggedRobot, slots: Slots, support: float) -> Array:
         support: the share; 0 for the motors alone.
     """
     places, peak = np.array(slots.joints), np.array(member.peak_torque)
+    if len(member.feet) <= 2:
+        return peak
     lifts = (places >= 0) & np.isin(places % len(ROLES), (_PITCH, _KNEE))
     least = support * member.own_mass * GRAVITY * member.leg_length
     return np.where(lifts, np.maximum(peak, least), peak)

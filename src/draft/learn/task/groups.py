@@ -57,7 +57,10 @@ class Actuation:
     stiffness: float = paper(STIFFNESS, "1/rad", "kp per peak torque")
     damping: float = paper(DAMPING, "s/rad", "kd per peak torque")
     support: float = choice(
-        0.0, "1", "least torque that gains of hip pitch and knee are per, over m g L", DRAFT
+        0.0,
+        "1",
+        "least torque that gains of hip pitch and knee are per on four legs, over m g L",
+        DRAFT,
     )
     action_scale: float = choice(
         0.175, "rad", "joint offset per unit of action", CODE, within=POSITIVE
