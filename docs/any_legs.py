@@ -205,7 +205,7 @@ def page(
             *_pictures(images),
             "## What does not walk, and why",
             "",
-            *text.WHY.format(walk=walk).splitlines(),
+            *text.WHY.format(walk=walk, twelve=f"{unseen['family']['ratio']:.2f}").splitlines(),
             "",
             *_failures(real),
         )

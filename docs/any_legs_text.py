@@ -22,11 +22,11 @@ way, in 8 % of the drawn bodies with slanting hips. In the policy that ships all
 
 Robots that fall lie outside the numbers of the training or near their ends, most by weak or slow
 ankles or slanting hips; but limx_oli_d04, n1 and icub lie inside and fall all the same. So do
-quadrupeds with weak hips, and those whose centre of mass is high above narrow feet, though each of
-their numbers lies inside: of the twelve bodies of [learning](learning.md) most sink and roll over.
-The network normalises its inputs with the zeros of bodies that lack a joint or a leg, so that the
-height of the centre of mass and the width between the feet hardly reach it. Draft drives such
-quadrupeds by the policy of all quadrupeds.
+quadrupeds whose centre of mass is high above narrow feet, though each of their numbers lies inside:
+the twelve of [learning](learning.md) roll over at {twelve} of the speed that the policy of all
+quadrupeds reaches with them (the median). The network normalises its inputs with the zeros of
+bodies that lack a joint or a leg, so that the height of the centre of mass and the width between
+the feet hardly reach it. Draft drives such quadrupeds by the policy of all quadrupeds.
 
 Gains of the joints once followed the torque of their motors alone, and weak robots stood softly.
 Those of hip pitch and knee are for at least 0.6 m g L now on four legs and more, in this policy
