@@ -340,8 +340,9 @@ def _physics() -> list[str]:
         f"the {SHOWN[name][0]} of {robot}"
         for name in shown
         for robot in robots
-        if name not in by_robot[robot, USUAL]
+        if name not in by_robot[robot, USUAL] and not name.startswith("step")
     ]
+    climb = [robot for robot in robots if "step_up" in by_robot[robot, USUAL]]
     lines = [
         "## Other physics",
         "",
@@ -350,7 +351,7 @@ def _physics() -> list[str]:
         f"{', '.join(robots)}, and the",
         "least and the greatest. What falls by a sixth or more holds on that ground alone.",
         *([f"Left out, as there is none as trained: {', '.join(none)}."] if none else []),
-        "Steps are those of the policy that climbs; a dash is not measured.",
+        *([f"Steps are those of {' and '.join(climb)}; a dash was not measured."] if climb else []),
         "",
         "| physics | " + " | ".join(SHOWN[name][0] for name in shown) + " |",
         "| --- |" + " --- |" * len(shown),

@@ -215,6 +215,13 @@ def test_gains_of_hip_pitch_and_knee_are_for_what_the_weight_asks_of_weak_motors
     assert servo_torque(weak, slots, 0.0).tolist() == list(weak.peak_torque)
 
 
+def test_more_legs_share_the_weight() -> None:
+    member = ROBOTS["hexapod"]
+    weak = replace(member, peak_torque=(1e-3,) * len(member.joints))
+    least = 4 / 6 * 0.6 * member.mass * 9.81 * member.leg_length
+    assert servo_torque(weak, slots_of(member), 0.6).max() == pytest.approx(least)
+
+
 def test_gains_on_two_legs_are_for_the_motors_alone() -> None:
     member = ROBOTS["biped"]
     assert servo_torque(member, slots_of(member), 9.0).tolist() == list(member.peak_torque)

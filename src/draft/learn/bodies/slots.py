@@ -160,20 +160,21 @@ def slots_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> Slots:
 def servo_torque(member: LeggedRobot, slots: Slots, support: float) -> Array:
     """Torque that the gains of each servo are for [N m], shape (joints,).
 
-    That is the motor's peak torque, and of hip pitch and knee at least a share of m g L: gains by
-    the motor alone let a robot with weak motors sink under its weight, and its actions move little.
+    That is the motor's peak torque, and of hip pitch and knee at least a share of m g L, on n legs
+    of 4 / n of that: gains by the motor alone let a robot with weak motors sink under its weight.
     Robots on two legs have those of their motors: their ankles would have to become stiffer too.
 
     Args:
         member: the robot.
         slots: its slots.
-        support: the share; 0 for the motors alone.
+        support: the share on four legs; 0 for the motors alone.
     """
     places, peak = np.array(slots.joints), np.array(member.peak_torque)
-    if len(member.feet) <= 2:
+    legs = len(member.feet)
+    if legs <= 2:
         return peak
     lifts = (places >= 0) & np.isin(places % len(ROLES), (_PITCH, _KNEE))
-    least = support * member.own_mass * GRAVITY * member.leg_length
+    least = 4 / legs * support * member.own_mass * GRAVITY * member.leg_length
     return np.where(lifts, np.maximum(peak, least), peak)
 
 
