@@ -27,7 +27,7 @@ BUDGET = {
     "fitting": 3_890,
     "imports": 6_462,  # Folders and missing files for descriptions.
     "laws": 2_090,  # The nearest module of the catalogue.
-    "learn": 21_137,  # Gains by weight, in every file; cells of bodies of any legs.
+    "learn": 21_139,  # Gains by weight, in every file; cells of bodies of any legs.
     "metrics": 3_200,
     "model": 5_655,  # USD; configurations for mjlab and Isaac Lab; parts in every format.
     "reporting": 1_614,  # A policy that drives no robot of a report is refused.

@@ -236,6 +236,7 @@ def test_a_robot_outside_the_training_counts_as_the_nearest_inside(legs: LegsPol
     [
         (lambda data: data[: len(data) // 2], "truncated"),
         (lambda data: data.replace(b"layout", b"layuot"), "metadata of .* invalid: joint_names"),
+        (lambda data: data.replace(b"\x030.6", b"\x03-.6"), r"its support is -\.6, and a share"),
         (lambda _: b"", "not a policy"),
     ],
 )

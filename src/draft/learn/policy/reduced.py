@@ -300,7 +300,10 @@ def _legs(file: Path, network: Network) -> LegsPolicy:
     try:
         if texts["layout"] != LAYOUT:
             raise ValueError(f"its layout is '{texts['layout']}', and '{LAYOUT}' is known")
-        velocity_noise(texts)  # Which may be wrong.
+        # Which may be wrong.
+        velocity_noise(texts)
+        if not 0 <= float(texts.get("support", "0")) < math.inf:
+            raise ValueError(f"its support is {texts['support']}, and a share is 0 or more")
         rows = (row.split(";") for row in texts["commands"].split(","))
         commands = {int(legs): (float(x), float(y), float(z)) for legs, x, y, z in rows}
         known = {
