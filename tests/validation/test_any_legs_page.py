@@ -104,6 +104,7 @@ def test_bars_of_bodies_are_means_over_bodies_and_the_worst_kind() -> None:
         ],
         "action": {"joints": 29, "ms": 0.1},
         "humanoid": {"top_speed": None},
+        "family": {"ratio": 0.39},
         "policy": {"megabytes": 0.5},
     }
     rows = {row["what"]: row for row in unseen.bars(found)}
@@ -117,6 +118,8 @@ def test_bars_of_bodies_are_means_over_bodies_and_the_worst_kind() -> None:
     assert (turn["value"], turn["met"]) == (pytest.approx(0.5), False)
     assert rows["never trained, up at 0.25, worst: eight legs"]["value"] == 0.7
     assert rows["shipped humanoid, top speed"]["met"] is False
+    family = rows["12 quadrupeds, top speed over that by the policy of all quadrupeds"]
+    assert (family["value"], family["met"]) == (0.39, False)
 
 
 def test_the_manifest_names_the_robots_and_their_further_files(tmp_path: Path) -> None:
