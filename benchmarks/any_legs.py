@@ -27,7 +27,6 @@ from rich.console import Console
 from rich.table import Table
 
 import draft
-from benchmarks.family import drawn
 from benchmarks.roll_outs import (
     FOLLOWED,
     PUSH,
@@ -241,6 +240,8 @@ def humanoid_speed(
 
 def family_speeds(legs: LegsPolicy, replicas: int, seconds: float) -> dict[str, Any]:
     """Top speeds of bodies of the truth map with both policies, per sqrt(g L), and their ratio."""
+    from benchmarks.family import drawn
+
     members = [body.robot for body in drawn(FAMILY_BODIES, FAMILY_SEED)]
     own, family = of_legs(legs, legs.file.name, members[0]), open_source(None)
     config = own.plan.config
