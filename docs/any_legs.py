@@ -1,6 +1,6 @@
 """What one policy for all legs can do: writes docs/any-legs.md.
 
-    python -m benchmarks.any_legs --out examples/results/any_legs.json    # eight minutes
+    python -m benchmarks.any_legs --out examples/results/any_legs.json    # four minutes
     python -m benchmarks.zero_shot --out examples/results/zero_shot.json  # seven
     python -m benchmarks.zero_shot --velocity-noise 0.5 --out examples/results/zero_shot_noisy.json
     python -m benchmarks.looks --out examples/results/looks.json          # half a minute

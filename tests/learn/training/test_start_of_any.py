@@ -65,11 +65,10 @@ def test_the_actor_is_the_policy_of_the_robot(file: Path, tmp_path: Path, name: 
     assert (model.obs_normalizer._std > 0).all()
     noise = float(own.network.metadata["action_std"].split(",")[0])
     assert model.distribution.std_param.detach().numpy() == pytest.approx(noise)
-    gains = robot_of(trainer.env)
-    for actuator in gains.actuators:
+    asked = own.of_robot(robot(name))
+    for actuator in robot_of(trainer.env).actuators:
         for column, joint in enumerate(actuator.target_ids.tolist()):
             kp, kd = (getattr(actuator, one)[0, column] for one in ("stiffness", "damping"))
-            asked = own.of_robot(robot(name))
             assert (float(kp), float(kd)) == pytest.approx(
                 (asked.stiffness[joint], asked.damping[joint])
             )
